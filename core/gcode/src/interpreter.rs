@@ -372,6 +372,7 @@ impl Interpreter {
             // What the line would have assigned exists, so that no later line complains of that.
             let _ = self.assign();
             self.execution(out).recover(complete);
+            self.state.curves.pass_over(&self.words, self.state.line);
         }
         done
     }

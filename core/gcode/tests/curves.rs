@@ -71,6 +71,33 @@ fn fanuc_curve() {
 }
 
 #[test]
+fn a_wrong_word_is_one_message_whatever_the_curve_holds() {
+    let fanuc = |first: &str, third: &str| {
+        format!("F60\n{first}\nK0 X0 Y5\n{third}\nK1 X9 Y5\nK3\nK3\nK3\nG01 X9 Y9")
+    };
+    let linuxcnc = |first: &str, third: &str| {
+        format!("F60\n{first}\nX0 Y5\n{third}\nX9 Y5\nX9 Y6\nG5.3\nG01 X9 Y9")
+    };
+    assert!(messages(&fanuc("G6.2 P3 Q2 K0", "K0 X5")).is_empty());
+    for (program, place) in [
+        (fanuc("G6.2 P3 K0 H2", "K0 X5"), "2:12 [unused-word]"),
+        (fanuc("G6.2 P3 K0 Q4", "K0 X5"), "2:12 [word-range]"),
+        (fanuc("G6.2 P3 K0 X1e5", "K0 X5"), "2:14 "),
+        (fanuc("G6.2 P3 K0", "K0 X5 H1"), "4:7 [unused-word]"),
+        (linuxcnc("G5.2 H2", "X5"), "2:6 [unused-word]"),
+        (linuxcnc("G5.2 P-1", "X5"), "2:6 [nurbs]"),
+        (linuxcnc("G5.2 G17 P2 L3 K1", "X5"), "2:16 [unused-word]"),
+        (linuxcnc("G5.2", "X5 P"), "4:4 "),
+    ] {
+        let found = messages(&program);
+        assert!(
+            found.len() == 1 && found[0].starts_with(place),
+            "{program}: {found:?}"
+        );
+    }
+}
+
+#[test]
 fn bezier_curves() {
     let made = curves("F60\nG5 X3 Y0 I1 J1 P-1 Q1\nX6 P-1 Q-1\nG5.1 X8 I1");
     let points = |n: usize| {

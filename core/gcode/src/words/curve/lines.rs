@@ -118,6 +118,8 @@ fn first_fanuc(line: &mut Line, curve: &mut Curve, start: AxisVector) -> Checked
         .integer(b'P', ORDERS)?
         .map_or(FANUC_ORDER, |order| order as usize);
     curve.order = Some(order);
+    // LinuxCNC chooses by it how it divides the curve, which is driven as it is here.
+    line.words.integer(b'Q', 1..=3)?;
     for axis in 0..line.letters.count() {
         let off = line.state.path.position[axis] - start[axis];
         if off.abs() > START_ROUNDING && !curve.broken {

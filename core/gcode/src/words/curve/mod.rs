@@ -54,8 +54,8 @@ pub(super) const WORDS: &[Word] = &[
     Word::new(
         "G6.2",
         Group::Motion,
-        "XYZABCUVWPKR",
-        "NURBS curve: a control point, knot K and weight R a line, then knots alone; P order",
+        "XYZABCUVWPKRQ",
+        "NURBS curve: a control point, knot K and weight R a line, then knots alone; P order; Q is accepted and has no effect",
         Action::MoveOnce(Shape::Curve, lines::open_fanuc),
         "G6.2 P3 K0\nK0 X3 Y5\nK0 X6\nK1\nK1\nK1",
     ),
@@ -92,6 +92,20 @@ pub(crate) struct Curve {
 }
 
 impl Curve {
+    fn new(dialect: Dialect, line: u32) -> Self {
+        Self {
+            dialect,
+            line,
+            order: None,
+            points: Vec::new(),
+            weights: Vec::new(),
+            knots: Vec::new(),
+            places: Places::default(),
+            inverse_time: None,
+            broken: false,
+        }
+    }
+
     pub fn add(&mut self, point: AxisVector, weight: f64) {
         self.points.push(point);
         self.weights.push(weight);
@@ -131,6 +145,22 @@ impl Curves {
         if let Some(curve) = &mut self.open {
             let count = curve.points.len().max(curve.knots.len());
             curve.places.note(number, text, count);
+        }
+    }
+
+    /// Line `number`, which could not be obeyed, would have opened a curve: its lines are read, and make no block.
+    pub fn pass_over(&mut self, words: &LineWords, number: u32) {
+        let codes = words.g.as_slice().iter().map(|code| code.tenths);
+        let mut dialects = codes.filter_map(|tenths| match tenths {
+            52 => Some(Dialect::LinuxCnc),
+            62 => Some(Dialect::Fanuc),
+            _ => None,
+        });
+        if let Some(dialect) = dialects.next_back().filter(|_| self.open.is_none()) {
+            self.open = Some(Curve {
+                broken: true,
+                ..Curve::new(dialect, number)
+            });
         }
     }
 
@@ -213,18 +243,12 @@ impl Curves {
 pub(crate) fn open_curve(line: &mut Line, dialect: Dialect, uncertain: u32) -> Checked<()> {
     line.state.motion = MotionMode::None;
     line.state.curves.open = Some(Curve {
-        dialect,
-        line: line.state.line,
-        order: None,
-        points: Vec::new(),
-        weights: Vec::new(),
-        knots: Vec::new(),
-        places: Places::default(),
         inverse_time: line
             .words
             .get(b'F')
             .filter(|_| line.state.modes.feed.mode == FeedMode::InverseTime),
         broken: uncertain != 0,
+        ..Curve::new(dialect, line.state.line)
     });
     line.refuse_machine_coordinates()?;
     // The lines of the curve have no F: what holds here holds for all of it.
