@@ -20,6 +20,7 @@ use crate::syntax::scan::Scanner;
 use crate::words::compensation::{self, Compensation};
 use crate::words::coolant::Coolant;
 use crate::words::orders::{Orders, polar_misplaced};
+use crate::words::subprogram::Jump;
 use crate::words::{curve, modal, probe, stop};
 
 /// Longest line, bytes.
@@ -61,7 +62,7 @@ pub struct Interpreter {
     phase: Phase,
     /// The line of the `%` that ended the program, and whether one had opened it.
     ended_by_percent: Option<(u32, bool)>,
-    /// Whether a word of the program has been read; a program number may only come before.
+    /// Whether a word of the program has been read; its name may only come before.
     begun: bool,
     /// A value of the current line follows from what the first pass has assumed.
     reads_assumed: Cell<bool>,
@@ -117,6 +118,11 @@ impl Interpreter {
         &self.config
     }
 
+    /// Whether a word of the program has been read.
+    pub(crate) fn has_begun(&self) -> bool {
+        self.begun
+    }
+
     /// A line with an O-word is executed instead of being interpreted.
     pub(crate) fn begin_o_word(&mut self, number: u32) {
         self.phase = Phase::after_text(self.phase);
@@ -143,6 +149,30 @@ impl Interpreter {
     pub(crate) fn enter_sub(&mut self, arguments: &[Value]) {
         self.parameters.enter(arguments);
         self.state.saved.enter();
+    }
+
+    /// Somebody executes M98 and M99, by [`Self::take_jump`].
+    pub(crate) fn obey_jumps(&mut self) {
+        self.state.subprograms.obeyed = true;
+    }
+
+    /// Where the line that was executed last says that the program goes on, and whether that follows from what has been
+    /// assumed.
+    #[inline]
+    pub(crate) fn take_jump(&mut self) -> Option<(Jump, bool)> {
+        let jump = self.state.subprograms.jump.take()?;
+        Some((jump, self.reads_assumed.get()))
+    }
+
+    /// A subprogram begins.
+    pub(crate) fn enter_subprogram(&mut self) {
+        self.parameters.enter_subprogram();
+        self.state.saved.enter();
+    }
+
+    /// The program begins again with its first line.
+    pub(crate) fn begin_again(&mut self) {
+        self.phase = Phase::Fresh;
     }
 
     /// A subroutine ends; what is restored then goes to `out`.
@@ -365,7 +395,7 @@ impl Interpreter {
             .and(sorted)
             .and_then(|()| self.assign())
             .and_then(|()| {
-                self.refuse_late_number()?;
+                self.refuse_number()?;
                 self.execution(out).execute()
             });
         if done.is_err() {
@@ -377,10 +407,11 @@ impl Interpreter {
         done
     }
 
-    /// A program number stands before all words.
+    /// The number of a program stands before all words, that of a subprogram alone in its line.
     #[inline]
-    fn refuse_late_number(&mut self) -> Checked<()> {
-        if self.words.has(b'O') && self.begun {
+    fn refuse_number(&mut self) -> Checked<()> {
+        let of_subprogram = self.state.subprograms.obeyed && self.words.is_number_of_program();
+        if self.words.has(b'O') && self.begun && !of_subprogram {
             return Err(self.words.fault(b'O', "o-word", O_WORDS));
         }
         self.begun |= !self.words.is_empty();

@@ -315,3 +315,91 @@ fn a_return_needs_no_label_of_its_own() {
         "o1 sub\no2 if [#1]\no2 return [7]\no2 endif\nG0 X1\no1 endsub\no1 call [1]\nG0 X#<_value>";
     assert_eq!(path(program), "8:7");
 }
+
+#[test]
+fn subprograms_share_the_parameters_and_are_driven_as_often_as_asked() {
+    assert_eq!(
+        path("#1=1\nM98 P0100 L3\nG0 X[#1 * 10]\nM30\nO100 (sub)\n#1=[#1+1]\nG0 X#1\nM99\nG0 X99"),
+        "7:2 7:3 7:4 3:40 4:40"
+    );
+    // A call acts behind the move of its line; L0 calls nothing; names are the callee's own.
+    let text =
+        "#<a>=5\nG0 X1 M98 P2\nM98 P2 L0\nG0 X#<a>\nM2\nO2\n#<a>=7\nG0 X[2 + EXISTS[#<b>]]\nM99";
+    assert_eq!(path(text), "2:1 8:2 4:5 5:5");
+    // Of two with the same number the one behind the call, and one before it where none is behind.
+    let text = "o1 if [0]\nO5\nG0 X3\nM99\no1 endif\nM98 P5\nM98 P6\nM30\nO6\nM98 P5\nM99\nO5\n#31=[#31+4]\nG0 X#31\nM99";
+    assert_eq!(path(text), "14:4 14:8 8:8");
+    // Loops lie within the call; M99 leaves them.
+    let text = "M98 P1 L2\nG0 X9\nM30\nO1\no2 repeat [3]\nG91 G0 X1\nG90\no3 if [#31 EQ 1]\n#31=0\nM99\no3 endif\n\
+                #31=1\no2 endrepeat\nM99";
+    assert_eq!(path(text), "6:1 6:2 6:3 6:4 2:9 3:9");
+}
+
+#[test]
+fn what_stands_behind_the_end_is_not_called() {
+    for text in [
+        "%\nG0 X1\no2 call\n%\no2 sub\nG0 X2\no2 endsub",
+        "(title)\n%\nG0 X1\nM98 P2\n%\nO2\nG0 X2\nM99",
+    ] {
+        let found = errors(text);
+        assert!(found[0].contains("there is no subroutine"), "{found:?}");
+    }
+}
+
+#[test]
+fn m99_begins_the_program_again() {
+    let text = "%\nO1 (warm up)\n#31=[#31+1]\no7 if [#31 GT 3]\nM30\no7 endif\nG0 X#31\nM99\n%";
+    assert_eq!(path(text), "7:1 7:2 7:3 5:3");
+    let mut config = mill();
+    config.max_steps = 1000;
+    let found = errors_on(&config, "G0 X1\nG0 X2\nM99");
+    assert!(
+        found[0].contains(
+            "[endless] the program, which M99 of line 3 begins again, goes on after 1000 lines"
+        ),
+        "{found:?}"
+    );
+}
+
+#[test]
+fn subprograms_and_subs_are_not_mixed() {
+    let cases = [
+        (
+            "M98 P1\nM30\no1 sub\no1 endsub",
+            "1:5 [o-word] o1 is a sub: o1 call calls it",
+        ),
+        (
+            "M98 P1\nM30",
+            "1:5 [o-word] there is no subroutine with this label in this file",
+        ),
+        (
+            "o1 sub\nM99\no1 endsub\no1 call",
+            "2:1 [o-word] M99 ends a subprogram that M98 has called",
+        ),
+        ("M98", "1:1 [word-missing] M98 needs P"),
+        ("M98 P1\nM30\nO1\nG1 X1\nM99", "4:1 [feed-missing]"),
+        ("M98 P1\nM30\nO1\nM98 P1\nM99", "calls lie 100 deep"),
+        (
+            "G0 X1\no<late>",
+            "2:1 [o-word] what the O-word does is missing here",
+        ),
+    ];
+    for (text, expected) in cases {
+        let found = errors(text);
+        assert!(
+            found.len() == 1 && found[0].contains(expected),
+            "{text}: {found:?}"
+        );
+    }
+    assert!(errors("M98 P1\nM30\nO1\nG1 X1\nM99")[0].ends_with("; in O1, called from line 1"));
+    assert_eq!(path("o<title>\nG0 X1"), "2:1");
+}
+
+#[test]
+fn a_subprogram_that_a_probe_chooses_is_checked_when_it_is_driven() {
+    let (_, report) = checked(
+        "F60 G38.2 Z-5\nM98 P[1 + #5070]\nM30\nO2\nG0 X1\nM99",
+        &mill(),
+    );
+    assert_eq!((report.is_ok(), report.seen_to), (true, Some(2)));
+}

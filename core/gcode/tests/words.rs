@@ -2,14 +2,17 @@
 
 mod common;
 
-use common::{assert_items, blocks, ends, last, mill, only_blocks, programs, run, run_on, short};
+use common::{
+    assert_items, blocks, ends, errors_of, last, mill, only_blocks, programs, run_on, short,
+};
 use tandem_gcode::{Item, docs};
 
 /// The fixture is a program for tests of whole runs: it must keep up with the words.
 #[test]
 fn the_fixture_holds_every_word_that_works() {
     let text = std::fs::read_to_string(programs().join("every-word.ngc")).unwrap();
-    run(&text);
+    let errors = errors_of(&text);
+    assert!(errors.is_empty(), "{errors:?}");
     let words: Vec<_> = text
         .split(|c: char| !c.is_ascii_alphanumeric() && c != '.')
         .collect();

@@ -16,7 +16,8 @@ use crate::program::lines::{Lines, Mark, Next, Pass};
 use crate::program::{Program, ProgramError};
 use crate::state::parameters::Value;
 use crate::syntax::scan::Scanner;
-use o_word::{Keyword, Label};
+use crate::words::subprogram::Jump;
+use o_word::{Keyword, Label, Title};
 use outline::Entry;
 use repeats::Repeats;
 use sources::{Sources, file};
@@ -46,10 +47,26 @@ struct Frame {
     /// Where the caller goes on.
     after: Mark,
     call_line: u32,
-    /// The subroutine, as an entry of the file that is executed.
-    sub: usize,
+    callee: Callee,
     /// Loops that the caller is in.
     repeats: usize,
+}
+
+/// What is called.
+enum Callee {
+    /// A subroutine, as an entry of the file that is executed.
+    Sub(usize),
+    /// A subprogram, where it begins and how often it is still to be driven.
+    Program { number: u32, start: Mark, left: u32 },
+}
+
+/// What has made the program go back.
+#[derive(Clone, Copy)]
+enum Loop {
+    /// An O-word: its file and its entry.
+    Word(usize, usize),
+    /// M99 in the program itself: its line.
+    Program(u32),
 }
 
 /// A program as it is executed.
@@ -62,7 +79,7 @@ pub(crate) struct Execution {
     /// Lines executed since the first O-word; in the second pass since the last item.
     steps: u64,
     /// The loop that has gone back last.
-    last_loop: Option<(usize, usize)>,
+    last_loop: Option<Loop>,
     /// The line that was executed last, in its chunk.
     last: Range<usize>,
     text: Vec<u8>,
@@ -73,6 +90,7 @@ impl Execution {
     pub fn new(program: &mut Program, config: &Config, pass: Pass) -> Self {
         let mut interpreter = Interpreter::new(config.clone());
         interpreter.set_file(&program.name);
+        interpreter.obey_jumps();
         Self {
             interpreter,
             pass,
@@ -128,6 +146,9 @@ impl Execution {
         if self.pass == Pass::Second && out.len() > items {
             self.steps = 0;
         }
+        if let Some((jump, assumed)) = self.interpreter.take_jump() {
+            return self.leap(program, jump, assumed, out);
+        }
         Ok(done.map_or_else(
             |diagnostic| Step::Wrong(self.called(diagnostic)),
             |()| Step::Line,
@@ -144,10 +165,14 @@ impl Execution {
         let lines = &self.sources.current().lines;
         let number = lines.number;
         if self.sources.current().outline.is_none() {
-            if let Ok(None) = o_word::OWord::read(lines.text(&self.last), at) {
+            match o_word::OWord::read(lines.text(&self.last), at) {
                 // The number of a program is a word as any other.
-                let done = self.interpreter.line(number, lines.text(&self.last), out);
-                return Ok(done.map_or_else(Step::Wrong, |()| Step::Line));
+                Ok(Title::Number(_)) => {
+                    let done = self.interpreter.line(number, lines.text(&self.last), out);
+                    return Ok(done.map_or_else(Step::Wrong, |()| Step::Line));
+                }
+                Ok(Title::Name) => return Ok(self.name_of_program(number)),
+                _ => {}
             }
             let which = self.sources.current;
             self.sources
@@ -162,6 +187,8 @@ impl Execution {
         let found = self.sources.outline().find(number);
         let step = if let Some(index) = found {
             self.obey(program, index, &text, out)
+        } else if let Ok(Title::Name) = o_word::OWord::read(&text, at) {
+            Ok(self.name_of_program(number))
         } else {
             let done = self.interpreter.line(number, &text, out);
             Ok(done.map_or_else(
@@ -171,6 +198,129 @@ impl Execution {
         };
         self.text = text;
         step
+    }
+
+    /// A `<name>` alone: before all words it names the program; behind them what the O-word does has been forgotten.
+    fn name_of_program(&mut self, number: u32) -> Step {
+        let begun = self.interpreter.has_begun();
+        self.interpreter.begin_o_word(number);
+        if !begun {
+            return Step::Line;
+        }
+        let text = self.text();
+        let fault = o_word::without_keyword(Span::new(0, text.len()));
+        let diagnostic = Diagnostic::new(self.interpreter.file(), number, text, fault);
+        Step::Wrong(self.called(diagnostic))
+    }
+
+    /// M98 and M99.
+    #[cold]
+    fn leap(
+        &mut self,
+        program: &mut Program,
+        jump: Jump,
+        assumed: bool,
+        out: &mut Vec<Item>,
+    ) -> Result<Step, ProgramError> {
+        let number = self.sources.current().lines.number;
+        let fault = match jump {
+            Jump::Call { .. } if assumed && self.pass == Pass::First => {
+                let text = self.text().to_vec();
+                return Ok(self.open(number, &text));
+            }
+            Jump::Call {
+                number: called,
+                times,
+                span,
+            } => match self.call_program(program, called, times)? {
+                Ok(()) => return Ok(Step::Line),
+                Err(why) => Fault::new(span, "o-word", why),
+            },
+            Jump::End => match self.end_program(program, out)? {
+                Ok(()) => return Ok(Step::Line),
+                Err(why) => Fault::new(Span::new(0, self.text().len()), "o-word", why),
+            },
+        };
+        let diagnostic = Diagnostic::new(self.interpreter.file(), number, self.text(), fault);
+        Ok(Step::Wrong(self.called(diagnostic)))
+    }
+
+    fn call_program(
+        &mut self,
+        program: &mut Program,
+        number: u32,
+        times: u32,
+    ) -> Result<Result<(), String>, ProgramError> {
+        if self.frames.len() == MAX_CALLS {
+            return Ok(Err(too_deep()));
+        }
+        let call_line = self.sources.current().lines.number;
+        let config = self.interpreter.config();
+        let (target, start) = match self
+            .sources
+            .find_program(program, number, call_line, config)?
+        {
+            Ok(found) => found,
+            Err(why) => return Ok(Err(why)),
+        };
+        self.frames.push(Frame {
+            file: self.sources.current,
+            after: self.sources.current().lines.mark(),
+            call_line,
+            callee: Callee::Program {
+                number,
+                start,
+                left: times - 1,
+            },
+            repeats: self.repeats.len(),
+        });
+        self.interpreter.enter_subprogram();
+        self.switch_to(program, target);
+        self.jump(program, start)?;
+        Ok(Ok(()))
+    }
+
+    /// M99.
+    fn end_program(
+        &mut self,
+        program: &mut Program,
+        out: &mut Vec<Item>,
+    ) -> Result<Result<(), String>, ProgramError> {
+        let repeats = self.frames.last().map_or(0, |frame| frame.repeats);
+        let again = match self.frames.last_mut().map(|frame| &mut frame.callee) {
+            None => {
+                if self.sources.current().outline.is_none() {
+                    let which = self.sources.current;
+                    self.sources
+                        .index(program, which, self.interpreter.config())?;
+                }
+                self.last_loop = Some(Loop::Program(self.sources.current().lines.number));
+                self.repeats.truncate(0);
+                self.interpreter.begin_again();
+                self.jump(program, Mark::START)?;
+                return Ok(Ok(()));
+            }
+            Some(Callee::Sub(_)) => {
+                let why =
+                    "M99 ends a subprogram that M98 has called: a sub ends with endsub or return";
+                return Ok(Err(why.into()));
+            }
+            Some(Callee::Program { left: 0, .. }) => None,
+            Some(Callee::Program { left, start, .. }) => {
+                *left -= 1;
+                Some(*start)
+            }
+        };
+        self.interpreter.leave_sub(None, out);
+        self.repeats.truncate(repeats);
+        if let Some(start) = again {
+            self.interpreter.enter_subprogram();
+            self.jump(program, start)?;
+        } else if let Some(frame) = self.frames.pop() {
+            self.switch_to(program, frame.file);
+            self.jump(program, frame.after)?;
+        }
+        Ok(Ok(()))
     }
 
     /// Executes the O-word `index` of the current file, whose line is `text`.
@@ -197,7 +347,7 @@ impl Execution {
             Keyword::Call | Keyword::Return | Keyword::EndSub
         );
         if decides && self.assumes() {
-            return Ok(self.open(&entry, text));
+            return Ok(self.open(entry.number, text));
         }
         match entry.word.keyword {
             Keyword::Call => return self.call(program, &entry, text),
@@ -248,12 +398,12 @@ impl Execution {
         self.values.first().is_some_and(|value| value.number != 0.0)
     }
 
-    fn open(&mut self, entry: &Entry, text: &[u8]) -> Step {
+    fn open(&mut self, number: u32, text: &[u8]) -> Step {
         let message = "from here on the program depends on what a probe or an input will answer: \
                        what follows is checked when it is driven";
         let span = Span::new(0, text.len());
         let fault = Fault::new(span, "branch-open", message);
-        let diagnostic = Diagnostic::new(self.interpreter.file(), entry.number, text, fault);
+        let diagnostic = Diagnostic::new(self.interpreter.file(), number, text, fault);
         Step::Open(Diagnostic {
             severity: Severity::Warning,
             ..self.called(diagnostic)
@@ -287,7 +437,7 @@ impl Execution {
             return Ok(Step::Wrong(self.called(diagnostic)));
         }
         if self.assumes() {
-            return Ok(self.open(&next, &line));
+            return Ok(self.open(next.number, &line));
         }
         self.choose(program, at)
     }
@@ -350,7 +500,7 @@ impl Execution {
         open: usize,
         with_test: bool,
     ) -> Result<(), ProgramError> {
-        self.last_loop = Some((self.sources.current, open));
+        self.last_loop = Some(Loop::Word(self.sources.current, open));
         let entry = self.sources.outline().entry(open);
         let mark = if with_test { entry.before } else { entry.after };
         self.jump(program, mark)
@@ -380,7 +530,7 @@ impl Execution {
                     .assumed_value(&mut Scanner::new(text, usize::from(*at)))
                 {
                     Ok(value) if value.assumed && self.pass == Pass::First => {
-                        return Ok(self.open(entry, text));
+                        return Ok(self.open(entry.number, text));
                     }
                     Ok(value) => format!("{}", value.number.round()).into(),
                     Err(fault) => {
@@ -405,10 +555,7 @@ impl Execution {
             ))
         };
         if self.frames.len() == MAX_CALLS {
-            let why = format!(
-                "calls lie {MAX_CALLS} deep within each other: a subroutine calls itself without end"
-            );
-            return Ok(Step::Stuck(refuse(self, why)));
+            return Ok(Step::Stuck(refuse(self, too_deep())));
         }
         let (target, sub) =
             match self
@@ -429,7 +576,7 @@ impl Execution {
             file: self.sources.current,
             after,
             call_line,
-            sub,
+            callee: Callee::Sub(sub),
             repeats,
         });
         self.interpreter.enter_sub(&self.values);
@@ -447,8 +594,14 @@ impl Execution {
         text: &[u8],
         out: &mut Vec<Item>,
     ) -> Result<Step, ProgramError> {
-        let Some(frame) = self.frames.pop() else {
-            let why = format!("{} without a call", entry.word.keyword.name());
+        let of_sub = |frame: &Frame| matches!(frame.callee, Callee::Sub(_));
+        let Some(frame) = self.frames.pop_if(|frame| of_sub(frame)) else {
+            let keyword = entry.word.keyword.name();
+            let why = if self.frames.is_empty() {
+                format!("{keyword} without a call")
+            } else {
+                format!("{keyword} in a subprogram: what M98 has called ends with M99")
+            };
             let fault = Fault::new(
                 Span::new(0, usize::from(entry.word.values_at)),
                 "o-word",
@@ -483,13 +636,14 @@ impl Execution {
                 .frames
                 .get(depth + 1)
                 .map_or(self.sources.current, |inner| inner.file);
-            let name = self
-                .sources
-                .get(which)
-                .outline
-                .as_ref()
-                .map(|outline| outline.shown(frame.sub));
-            let name = name.unwrap_or_default().replace(" sub", "");
+            let name = match frame.callee {
+                Callee::Sub(sub) => {
+                    let outline = self.sources.get(which).outline.as_ref();
+                    let name = outline.map(|outline| outline.shown(sub));
+                    name.unwrap_or_default().replace(" sub", "")
+                }
+                Callee::Program { number, .. } => format!("O{number}"),
+            };
             let _ = write!(
                 diagnostic.message,
                 "; in {name}, called from line {}",
@@ -514,13 +668,15 @@ impl Execution {
         } else {
             ""
         };
-        let whose = self.last_loop.and_then(|(which, open)| {
-            let outline = self.sources.get(which).outline.as_ref()?;
-            Some(format!(
-                "{} of line {} goes on",
-                outline.shown(open),
-                outline.entry(open).number
-            ))
+        let whose = self.last_loop.and_then(|last| match last {
+            Loop::Word(which, open) => {
+                let outline = self.sources.get(which).outline.as_ref()?;
+                let number = outline.entry(open).number;
+                Some(format!("{} of line {number} goes on", outline.shown(open)))
+            }
+            Loop::Program(number) => Some(format!(
+                "the program, which M99 of line {number} begins again, goes on"
+            )),
         });
         let whose = whose.unwrap_or_else(|| "the program goes on".into());
         let message =
@@ -535,4 +691,8 @@ impl Execution {
             fault,
         ))
     }
+}
+
+fn too_deep() -> String {
+    format!("calls lie {MAX_CALLS} deep within each other: a subroutine calls itself without end")
 }

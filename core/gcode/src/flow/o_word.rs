@@ -1,6 +1,6 @@
 //! The text of a line with an O-word: `o100 while [#1 LT 5]`.
 
-use crate::fault::{Checked, Fault};
+use crate::fault::{Checked, Fault, Span};
 use crate::syntax::scan::Scanner;
 
 /// Longest name of a subroutine.
@@ -98,17 +98,28 @@ pub(crate) fn find(text: &[u8], block_delete: bool) -> Option<usize> {
     }
 }
 
+/// What a line says that begins with O.
+#[derive(Clone, Debug)]
+pub(crate) enum Title {
+    Word(OWord),
+    /// A number alone: that of the program or of a subprogram.
+    Number(Box<str>),
+    /// A `<name>` alone: that of the program.
+    Name,
+}
+
 impl OWord {
-    /// Reads the O-word of a line whose label begins at `at`; `None` where there is a number alone, which is the number
-    /// of the program.
-    pub fn read(text: &[u8], at: usize) -> Checked<Option<Self>> {
+    /// Reads a line whose label begins at `at`.
+    pub fn read(text: &[u8], at: usize) -> Checked<Title> {
         let mut scanner = Scanner::new(text, at);
         scanner.skip_blanks();
         let numbered = scanner.peek().is_ascii_digit();
         let label = label(&mut scanner)?;
         scanner.skip_ignorable()?;
-        if numbered && scanner.at_end() {
-            return Ok(None);
+        match label {
+            Label::Fixed(label) if numbered && scanner.at_end() => return Ok(Title::Number(label)),
+            Label::Fixed(_) if scanner.at_end() => return Ok(Title::Name),
+            _ => {}
         }
         let start = scanner.at();
         let word: String = scanner
@@ -121,17 +132,12 @@ impl OWord {
             .iter()
             .find(|(name, _)| name.eq_ignore_ascii_case(&word));
         let Some((_, keyword)) = keyword else {
-            let names: Vec<_> = Keyword::ALL.iter().map(|(name, _)| *name).collect();
-            let message = format!(
-                "what the O-word does is missing here: one of {}",
-                names.join(", ")
-            );
             let span = if word.is_empty() {
                 scanner.here()
             } else {
                 scanner.since(start)
             };
-            return Err(Fault::new(span, "o-word", message));
+            return Err(without_keyword(span));
         };
         if matches!(label, Label::Computed(_)) && *keyword != Keyword::Call {
             return Err(Fault::new(
@@ -140,12 +146,22 @@ impl OWord {
                 "only a call may have a computed number",
             ));
         }
-        Ok(Some(Self {
+        Ok(Title::Word(Self {
             label,
             keyword: *keyword,
             values_at: scanner.at() as u16,
         }))
     }
+}
+
+/// A label without a keyword.
+pub(crate) fn without_keyword(span: Span) -> Fault {
+    let names: Vec<_> = Keyword::ALL.iter().map(|(name, _)| *name).collect();
+    let message = format!(
+        "what the O-word does is missing here: one of {}",
+        names.join(", ")
+    );
+    Fault::new(span, "o-word", message)
 }
 
 fn label(scanner: &mut Scanner) -> Checked<Label> {
@@ -231,9 +247,10 @@ mod tests {
     fn o_words_are_found_and_read() {
         let read = |text: &str| {
             let at = find(text.as_bytes(), false)?;
-            OWord::read(text.as_bytes(), at)
-                .unwrap()
-                .map(|word| (word.label, word.keyword, word.values_at))
+            match OWord::read(text.as_bytes(), at).unwrap() {
+                Title::Word(word) => Some((word.label, word.keyword, word.values_at)),
+                Title::Number(_) | Title::Name => None,
+            }
         };
         let fixed = |label: &str| Label::Fixed(label.into());
         assert_eq!(read("o100 sub"), Some((fixed("100"), Keyword::Sub, 8)));

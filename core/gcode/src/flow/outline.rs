@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::o_word::{self, Keyword, Label, OWord};
+use super::o_word::{self, Keyword, Label, OWord, Title};
 use crate::diagnostic::Diagnostic;
 use crate::fault::{Checked, Fault, Span};
 use crate::program::lines::{Lines, Mark, Next};
@@ -32,6 +32,8 @@ pub(crate) struct Outline {
     entries: Vec<Entry>,
     /// The subroutines by their labels.
     subs: HashMap<Box<str>, usize>,
+    /// Numbers in lines of their own, where subprograms begin: the number, its line and the place after it.
+    programs: Vec<(Box<str>, u32, Mark)>,
     /// Blocks that another's end has left unclosed.
     given_up: Vec<usize>,
     /// What is wrong with the O-words of a line. It counts where the line is executed, and not where it never is.
@@ -47,6 +49,7 @@ impl Outline {
     ) -> Result<Self, ProgramError> {
         let mut outline = Self::default();
         let mut open = Vec::new();
+        let mut begun = false;
         lines.seek(program, Mark::START)?;
         loop {
             let before = lines.mark();
@@ -57,12 +60,22 @@ impl Outline {
             };
             let number = lines.number;
             let text = lines.text(&range);
+            match text.iter().find(|b| !matches!(b, b' ' | b'\t')) {
+                // What stands behind the end is no part of the program.
+                Some(b'%') if begun => break,
+                None | Some(b'(' | b';') => {}
+                Some(_) => begun = true,
+            }
             let Some(at) = o_word::find(text, block_delete) else {
                 continue;
             };
             let added = match OWord::read(text, at) {
-                Ok(None) => continue,
-                Ok(Some(word)) => {
+                Ok(Title::Number(label)) => {
+                    outline.programs.push((label, number, lines.mark()));
+                    outline.bound()
+                }
+                Ok(Title::Name) => continue,
+                Ok(Title::Word(word)) => {
                     let entry = Entry {
                         number,
                         word,
@@ -126,13 +139,25 @@ impl Outline {
         }
     }
 
-    /// Adds an entry; `open` are the blocks that are not closed yet.
-    fn add(&mut self, entry: Entry, open: &mut Vec<usize>) -> Checked<()> {
-        let index = self.entries.len();
-        if index == MAX_O_WORDS {
+    fn bound(&self) -> Checked<()> {
+        if self.entries.len() + self.programs.len() > MAX_O_WORDS {
             let message = format!("a file holds at most {MAX_O_WORDS} O-words");
             return Err(Fault::new(Span::new(0, 1), "o-word", message));
         }
+        Ok(())
+    }
+
+    /// Where the subprogram with this number begins that is called in line `from`: behind it, or else before it.
+    pub fn program(&self, label: &str, from: u32) -> Option<Mark> {
+        let mut all = self.programs.iter().filter(|(found, ..)| **found == *label);
+        let behind = all.clone().find(|(_, line, _)| *line > from);
+        behind.or_else(|| all.next()).map(|(.., mark)| *mark)
+    }
+
+    /// Adds an entry; `open` are the blocks that are not closed yet.
+    fn add(&mut self, entry: Entry, open: &mut Vec<usize>) -> Checked<()> {
+        self.bound()?;
+        let index = self.entries.len();
         let keyword = entry.word.keyword;
         let label = entry.word.label.clone();
         self.entries.push(Entry {

@@ -107,6 +107,62 @@ impl Sources {
                 return Ok(Ok((which, sub)));
             }
         }
+        let which = match self.file_of(program, label, config)? {
+            Ok(which) => which,
+            Err(why) => return Ok(Err(why)),
+        };
+        let found = self.list[which]
+            .outline
+            .as_ref()
+            .and_then(|outline| outline.sub(label));
+        let name = Arc::clone(&file(program, which).name);
+        Ok(found
+            .map(|sub| (which, sub))
+            .ok_or_else(|| format!("{name} holds no subroutine o<{label}>")))
+    }
+
+    /// The file and the place where the lines of a subprogram begin that line `from` of the current file calls: in the
+    /// current file, in the program, or in a file of its own.
+    pub fn find_program(
+        &mut self,
+        program: &mut Program,
+        number: u32,
+        from: u32,
+        config: &Config,
+    ) -> Result<Result<(usize, Mark), String>, ProgramError> {
+        let label = number.to_string();
+        if self.current().outline.is_none() {
+            self.index(program, self.current, config)?;
+        }
+        for (which, from) in [(self.current, from), (0, 0)] {
+            let outline = self.list[which].outline.as_ref();
+            if let Some(mark) = outline.and_then(|outline| outline.program(&label, from)) {
+                return Ok(Ok((which, mark)));
+            }
+        }
+        if self.outline().sub(&label).is_some() {
+            let why = format!("o{label} is a sub: o{label} call calls it, M98 does not");
+            return Ok(Err(why));
+        }
+        let which = match self.file_of(program, &label, config)? {
+            Ok(which) => which,
+            Err(why) => return Ok(Err(why)),
+        };
+        let outline = self.list[which].outline.as_ref();
+        let found = outline.and_then(|outline| outline.program(&label, 0));
+        let name = Arc::clone(&file(program, which).name);
+        Ok(found
+            .map(|mark| (which, mark))
+            .ok_or_else(|| format!("{name} holds no subprogram O{label}")))
+    }
+
+    /// Opens the file of a subroutine, where that has not been done, and finds its O-words.
+    fn file_of(
+        &mut self,
+        program: &mut Program,
+        label: &str,
+        config: &Config,
+    ) -> Result<Result<usize, String>, ProgramError> {
         let known = program
             .subroutines
             .iter()
@@ -131,14 +187,7 @@ impl Sources {
         if self.list[place + 1].outline.is_none() {
             self.index(program, place + 1, config)?;
         }
-        let found = self.list[place + 1]
-            .outline
-            .as_ref()
-            .and_then(|outline| outline.sub(label));
-        let name = Arc::clone(&program.subroutines[place].1.name);
-        Ok(found
-            .map(|sub| (place + 1, sub))
-            .ok_or_else(|| format!("{name} holds no subroutine o<{label}>")))
+        Ok(Ok(place + 1))
     }
 }
 

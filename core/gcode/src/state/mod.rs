@@ -19,6 +19,7 @@ use crate::words::modes::Modes;
 use crate::words::outputs::Outputs;
 use crate::words::overrides::Permits;
 use crate::words::spindle::Spindle;
+use crate::words::subprogram::Subprograms;
 
 use coordinates::Coordinates;
 use path::Path;
@@ -54,6 +55,7 @@ pub(crate) struct State {
     /// What M70 and M73 have saved.
     pub saved: SavedStates,
     pub cycles: Cycles,
+    pub subprograms: Subprograms,
     /// The program is over.
     pub ended: bool,
 }
@@ -105,6 +107,7 @@ impl State {
             compensation: Compensation::default(),
             saved: SavedStates::default(),
             cycles: Cycles::default(),
+            subprograms: Subprograms::default(),
             ended: false,
         }
     }

@@ -56,7 +56,8 @@ pub(crate) struct Parameters {
 /// What a caller has of its own while a subroutine is executed.
 #[derive(Clone)]
 struct Caller {
-    numbered: [Value; LOCAL],
+    /// None where the called one shares them.
+    numbered: Option<[Value; LOCAL]>,
     local: Names,
 }
 
@@ -114,19 +115,29 @@ impl Parameters {
         numbered[..arguments.len()].copy_from_slice(arguments);
         numbered.swap_with_slice(&mut self.numbered[1..=LOCAL]);
         self.callers.push(Caller {
-            numbered,
+            numbered: Some(numbered),
             local: std::mem::take(&mut self.local),
         });
     }
 
-    /// A subroutine ends, and returns a value or none.
+    /// A subprogram begins: it shares #1 to #30 with its caller, and has local names of its own.
+    pub fn enter_subprogram(&mut self) {
+        self.callers.push(Caller {
+            numbered: None,
+            local: std::mem::take(&mut self.local),
+        });
+    }
+
+    /// A subroutine ends, and returns a value or none; a subprogram returns nothing.
     pub fn leave(&mut self, value: Option<Value>) {
-        self.returned = value;
         let Some(caller) = self.callers.pop() else {
             return;
         };
         self.names -= self.local.len();
-        self.numbered[1..=LOCAL].copy_from_slice(&caller.numbered);
+        if let Some(numbered) = caller.numbered {
+            self.returned = value;
+            self.numbered[1..=LOCAL].copy_from_slice(&numbered);
+        }
         self.local = caller.local;
     }
 

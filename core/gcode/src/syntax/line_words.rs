@@ -143,6 +143,16 @@ impl LineWords {
         self.present == 0 && self.polar.is_none() && self.g.count == 0 && self.m.count == 0
     }
 
+    /// Whether a number O is all that the line says.
+    pub fn is_number_of_program(&self) -> bool {
+        self.present & !mask("NO") == 0
+            && self.polar.is_none()
+            && self.time_constant.is_none()
+            && self.assignments.is_empty()
+            && self.g.count == 0
+            && self.m.count == 0
+    }
+
     /// Adds a word other than G and M.
     #[inline]
     pub fn add(&mut self, letter: u8, value: f64, span: Span) -> Checked<()> {

@@ -28,6 +28,7 @@ pub(crate) mod probe;
 mod refused;
 pub(crate) mod spindle;
 pub(crate) mod stop;
+pub(crate) mod subprogram;
 pub(crate) mod tool;
 mod user;
 
@@ -225,7 +226,7 @@ const fn tenths(code: &str) -> u16 {
 }
 
 /// The words of all subjects.
-static SUBJECTS: [&[Word]; 19] = [
+static SUBJECTS: [&[Word]; 20] = [
     motion::WORDS,
     arc::WORDS,
     curve::WORDS,
@@ -244,6 +245,7 @@ static SUBJECTS: [&[Word]; 19] = [
     overrides::WORDS,
     user::WORDS,
     stop::WORDS,
+    subprogram::WORDS,
     refused::WORDS,
 ];
 
@@ -340,7 +342,7 @@ fn nothing(_line: &mut Line) -> Checked<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{mill, run_on};
+    use crate::testing::errors_of;
 
     #[test]
     fn every_row_is_found_by_its_number() {
@@ -360,7 +362,7 @@ mod tests {
     fn every_example_is_true() {
         for word in all() {
             assert!(word.example.contains(word.code), "{}", word.code);
-            let (_, errors) = run_on(mill(), &format!("F100 S100\n{}", word.example));
+            let errors = errors_of(&format!("F100 S100\n{}", word.example));
             match word.action {
                 Action::Refuse(why) => {
                     let error = errors

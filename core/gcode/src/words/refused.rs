@@ -1,16 +1,12 @@
 //! Words that are known and refused, with the reason.
 
-use super::Group::{
-    Motion, NonModal, Plane, Polar, Rotation, Scaling, Spindle, Stop, ToolLength, User,
-};
+use super::Group::{Motion, NonModal, Plane, Polar, Rotation, Scaling, Spindle, Stop, ToolLength};
 use super::Word;
 
 const CYCLES: &str = "this canned cycle is not supported: let the CAM system write it out";
 const TURNING: &str = "turning cycles are not supported: let the CAM system write the passes out";
 const SYNCHRONOUS: &str = "motion synchronous with the spindle is not supported";
 const FRAMES: &str = "scaling, rotation, mirroring and polar coordinates are not supported";
-const SUBPROGRAMS: &str =
-    "subprograms are not supported: let the CAM system write the program out flat";
 
 pub(super) const WORDS: &[Word] = &[
     Word::refused(
@@ -78,6 +74,4 @@ pub(super) const WORDS: &[Word] = &[
         "motion synchronous with the spindle is not supported",
     ),
     Word::refused("M60", Stop, "pallet change", "pallets are not supported"),
-    Word::refused("M98", User, "subprogram call", SUBPROGRAMS),
-    Word::refused("M99", User, "subprogram return", SUBPROGRAMS),
 ];

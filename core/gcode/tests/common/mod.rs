@@ -3,7 +3,7 @@
 
 use std::path::PathBuf;
 
-use tandem_gcode::{Config, Diagnostic, Interpreter, Item, ProbeInput, ProbeResult, Tool};
+use tandem_gcode::{Config, Diagnostic, Interpreter, Item, ProbeInput, ProbeResult, Program, Tool};
 use tandem_sdk::{Axes, AxisVector, Block, BlockKind, Edge, NurbsData, PathMode};
 
 /// X, Y ±250 mm, Z −100 to 100 mm, A without limits; two tools, a probe on
@@ -58,6 +58,13 @@ pub fn run_on(config: Config, text: &str) -> (Vec<Item>, Vec<Diagnostic>) {
 }
 
 /// The blocks of a program without errors.
+/// What is wrong with a program, whose subprograms are driven too.
+pub fn errors_of(text: &str) -> Vec<Diagnostic> {
+    let mut program = Program::spool("program", text.as_bytes()).unwrap();
+    let report = tandem_gcode::check(&mut program, &mill(), &mut |_, _| Ok(())).unwrap();
+    report.diagnostics
+}
+
 pub fn blocks(text: &str) -> Vec<Block> {
     only_blocks(&run(text))
 }

@@ -9,8 +9,6 @@ use super::compare::Move;
 
 /// What is said of a program that the judge does not end: some loops within repeats in subroutines keep it going for ever.
 pub const NEVER_ENDS: &str = "the judge does not end";
-/// What is said of a move that radius compensation would turn around, which the judge drives in some cases.
-pub const UNSEEN: &str = "the corner lies before the start of the first, and the tool would cut";
 const NO_END: &str = "File ended with no percent sign";
 const GIVE_UP_MS: u32 = 4000;
 /// Without a configuration its tool table is in inches.

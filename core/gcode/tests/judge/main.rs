@@ -7,6 +7,7 @@ mod canon;
 #[path = "../common/mod.rs"]
 mod common;
 mod compare;
+mod flat;
 mod programs;
 
 use std::path::Path;
@@ -16,6 +17,8 @@ use compare::{judge, moving, ours};
 use tandem_gcode::Config;
 use tandem_sdk::{Axes, AxisVector};
 
+/// What is said of a move that radius compensation would turn around, which the judge drives in some cases.
+const UNSEEN: &str = "the corner lies before the start of the first, and the tool would cut";
 /// Number, length and diameter, mm.
 const TOOLS: [(u32, f64, f64); 2] = [(1, 20.0, 2.0), (2, 25.0, 0.5)];
 
@@ -48,8 +51,8 @@ fn difference(text: &str, judge: &Path, folder: &Path) -> Option<String> {
             None
         }
         // The judge does not look back where an arc follows around an outside corner.
-        (Err(mine), Ok(_)) if mine.contains(canon::UNSEEN) => {
-            println!("{}: {mine}", canon::UNSEEN);
+        (Err(mine), Ok(_)) if mine.contains(UNSEEN) => {
+            println!("{UNSEEN}: {mine}");
             None
         }
         (Err(mine), Ok(_)) => Some(format!("refused here, taken by the judge: {mine}")),
@@ -58,7 +61,10 @@ fn difference(text: &str, judge: &Path, folder: &Path) -> Option<String> {
     }
 }
 
-fn judge_all(kind: &str, count: u64, least_tenths: u64, program: fn(u64) -> String) {
+/// Writes a program from a seed.
+type Writer = fn(u64) -> String;
+
+fn judge_all(kind: &str, count: u64, least_tenths: u64, program: Writer) {
     let Some(judge) = judge() else {
         println!(
             "skipped: rs274 (Debian's linuxcnc-uspace) is not installed, and RS274 names none"
@@ -112,6 +118,11 @@ fn programs_with_o_words() {
 }
 
 #[test]
+fn programs_with_subprograms() {
+    judge_all("subprograms", 60, 9, programs::with_subprograms);
+}
+
+#[test]
 fn programs_with_canned_cycles() {
     judge_all("cycles", 60, 9, programs::with_cycles);
 }
@@ -125,4 +136,43 @@ fn programs_with_radius_compensation() {
 #[test]
 fn programs_with_offsets_and_rotation() {
     judge_all("offsets", 60, 9, programs::with_offsets);
+}
+
+/// Calls, loops, cycles and offsets leave nothing in the path that their moves alone would not: a planner drives both in the same
+/// time. And a program makes the same blocks whenever it is read.
+#[test]
+fn moves_written_out_are_the_same_blocks() {
+    let folder = std::env::temp_dir().join(format!("tandem-written-out-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let config = machine(&folder);
+    let [program, plain] = ["program.ngc", "plain.ngc"].map(|name| folder.join(name));
+    let kinds: [(&str, Writer); 5] = [
+        ("o-words", programs::with_o_words),
+        ("subprograms", programs::with_subprograms),
+        ("cycles", programs::with_cycles),
+        ("offsets", programs::with_offsets),
+        ("compensation", programs::with_compensation),
+    ];
+    for (kind, write) in kinds {
+        let mut compared = 0;
+        for seed in 0..40 {
+            let text = write(seed);
+            std::fs::write(&program, &text).unwrap();
+            let Some(blocks) = flat::blocks(&program, &config) else {
+                continue;
+            };
+            let again = flat::blocks(&program, &config).unwrap();
+            assert_eq!(flat::shown(&blocks), flat::shown(&again), "{kind} {seed}");
+            std::fs::write(&plain, flat::written_out(&blocks)).unwrap();
+            let written = flat::blocks(&plain, &config)
+                .unwrap_or_else(|| panic!("{kind} {seed}: the moves are refused\n{text}"));
+            if let Some(why) = flat::parting(&blocks, &written) {
+                panic!("{kind} {seed}: {why}\n{text}");
+            }
+            compared += blocks.len();
+        }
+        println!("{kind}: {compared} blocks");
+        assert!(compared > 150, "{kind}: {compared} blocks are too few");
+    }
+    let _ = std::fs::remove_dir_all(&folder);
 }

@@ -230,6 +230,34 @@ pub fn with_o_words(seed: u64) -> String {
     writer.text
 }
 
+/// Subprograms that call those behind them, some times over.
+pub fn with_subprograms(seed: u64) -> String {
+    let mut writer = Writer::new(seed, 0);
+    let count = 1 + writer.below(4);
+    writer.line("O7 (title)\n#1 = 1\n#<_count> = 2");
+    for number in 0..=count {
+        if number > 0 {
+            writer.line(&format!("O{:04}", 100 + number));
+        }
+        for _ in 0..=writer.below(2) {
+            writer.left = 6;
+            // No blocks of O-words: the judge loses its way in those that M98 leaves.
+            writer.statements(4);
+            writer.line("#1 = [[#1 * 3 + 1] MOD 7]");
+            if number < count {
+                let called = number + 1 + writer.below(count - number);
+                // The judge takes L0 in a subprogram for a call, from which the next M99 returns.
+                let none = if number == 0 { " L0" } else { "" };
+                let times = writer.random.pick(&["", " L2", none, " L[1 + [#1 MOD 2]]"]);
+                writer.line(&format!("M98 P{}{times}", 100 + called));
+            }
+        }
+        writer.line(if number == 0 { "M30" } else { "M99" });
+    }
+    // What a subroutine returns: there is none.
+    writer.text.replace("#<_value>", "3")
+}
+
 /// Canned cycles in three planes, absolute and incremental, in mm and inches, with offsets.
 pub fn with_cycles(seed: u64) -> String {
     let mut writer = Writer::new(seed, 0);
