@@ -38,6 +38,31 @@ fn programs_that_cannot_run_say_why() {
     refused(b"F100\nG1 X[1+\n", &["bad.ngc:2:"]);
 }
 
+/// The page of a program that is refused shows where the tool does not fit.
+#[test]
+fn the_report_draws_where_the_tool_does_not_fit() {
+    let folder = tempfile::tempdir().unwrap();
+    let page = folder.path().join("page.html");
+    let done = Scenario::text("G21 G90 F600\nG41.1 D6 G1 X10\nX20\nY2\nX0\nG40 Y9\nM2\n")
+        .with(&["--report", page.to_str().unwrap()])
+        .run();
+    assert_eq!(done.status(), 1, "{}", done.errors());
+    assert!(
+        done.errors().contains("moves of the lines 4 and 5"),
+        "{}",
+        done.errors()
+    );
+    let html = std::fs::read_to_string(page).unwrap();
+    for text in [
+        "moves of the lines 4 and 5",
+        "<title>line 4</title>",
+        "<title>line 5</title>",
+        "radius 3 mm",
+    ] {
+        assert!(html.contains(text), "{text} is not in {html}");
+    }
+}
+
 #[test]
 fn all_errors_of_a_file_are_listed() {
     let mut program = "F100\n".to_string();

@@ -2,6 +2,38 @@
 
 use crate::harness::Scenario;
 
+/// A plate of pockets: loops, calls of both kinds, modal words that change nothing, and a cycle.
+const PLATE: &str = "G21 G90 G17 G64\nF2400\no<corner> sub\nG1 X[#1] Y[#2] F2400 M9\nG64\nG90 G1 X[#1 + 4] T0\n\
+    G3 X[#1 + 8] Y[#2 + 4] J4\no<corner> endsub\n#5=0\no1 while [#5 LT 6]\no<corner> call [#5 * 8] [#5 * 4]\n\
+    #5=[#5 + 1]\no1 endwhile\nM98 P20 L5\nG99 G81 X60 Y30 Z-3 R1\nX70\nG80\nM30\nO20\nG91 G1 X3 Y0.5\nX3 Y-0.5\nG90\nM99\n";
+
+/// The feed does not dip at a call, a return, a turn of a loop or a word: the run takes as long as its moves written out.
+#[test]
+fn calls_loops_and_modal_words_take_no_time() {
+    let mut plain = String::from("G21 G90 G17 G64\nF2400\n");
+    for n in 0..6 {
+        let (x, y) = (n * 8, n * 4);
+        plain += &format!("G1 X{x} Y{y}\nX{}\nG3 X{} Y{} J4\n", x + 4, x + 8, y + 4);
+    }
+    for n in 0..5 {
+        plain += &format!("G1 X{} Y24.5\nX{} Y24\n", 51 + 6 * n, 54 + 6 * n);
+    }
+    plain += "G61\nG0 Z1\nG0 X60 Y30\nG1 Z-3\nG0 Z1\nG0 X70\nG1 Z-3\nG0 Z1\nM30\n";
+    for planner in ["look-ahead", "smooth"] {
+        let planner = format!("planner.plugin={planner}");
+        let [called, written] = [PLATE, &plain].map(|text| {
+            let done = Scenario::text(text).with(&["--set", &planner]).run();
+            done.assert_within_limits();
+            (done.number("samples"), done.column("x_cmd_mm"))
+        });
+        assert_eq!(called.0, written.0, "{planner}");
+        assert!(
+            called.1 == written.1,
+            "{planner}: the samples are not the same"
+        );
+    }
+}
+
 const STOPS: &str = "G21 G90\nT1\nF3000\nG1 X10\nM0\nG1 X20\nM6\nG1 X30\nM1\nG1 X40\nM2\n";
 
 #[test]

@@ -264,6 +264,9 @@ pub struct Check {
     /// As for a run with --home, which a machine that is to be homed first always is
     #[arg(long)]
     pub home: bool,
+    /// Where the program is refused, write why, and draw where the tool does not fit
+    #[arg(long, value_name = "F.html")]
+    pub report: Option<PathBuf>,
 }
 
 #[derive(Group)]

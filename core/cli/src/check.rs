@@ -8,7 +8,7 @@ use tandem_machine::Machine;
 use tandem_session::HOMING;
 
 use crate::args::Check;
-use crate::{REFUSED, built_in, program};
+use crate::{REFUSED, built_in, program, refusal};
 
 /// Lists every error of a program, or says what the run would refuse of the machine.
 pub fn check(options: &Check) -> Result<u8, Box<dyn Error>> {
@@ -42,6 +42,9 @@ pub fn check(options: &Check) -> Result<u8, Box<dyn Error>> {
         return Ok(0);
     }
     program::print_errors(&report);
+    if let Some(path) = &options.report {
+        refusal::write(path, &name, &report)?;
+    }
     let count = report.diagnostics.len() as u64 + report.unlisted;
     say!("{name}: {count} error{}", if count == 1 { "" } else { "s" });
     Ok(REFUSED)

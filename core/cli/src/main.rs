@@ -36,6 +36,7 @@ mod operator;
 mod plugin;
 mod program;
 mod progress;
+mod refusal;
 mod report;
 mod run;
 mod script;

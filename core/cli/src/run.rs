@@ -20,7 +20,7 @@ use crate::progress::Progress;
 use crate::report::Collector;
 use crate::trace::TraceSink;
 use crate::warnings::tell_warnings;
-use crate::{FAULT, REFUSED, args, built_in, clock, hang, operator, program};
+use crate::{FAULT, REFUSED, args, built_in, clock, hang, operator, program, refusal};
 
 /// Runs a program.
 pub fn run(options: &args::Run) -> Result<u8, Box<dyn Error>> {
@@ -33,6 +33,9 @@ pub fn run(options: &args::Run) -> Result<u8, Box<dyn Error>> {
     let run = match Run::prepare(machine.clone(), &registry, program, switches) {
         Err(HostError::Check(report)) => {
             program::print_errors(&report);
+            if let Some(path) = &options.report {
+                refusal::write(path, &name, &report)?;
+            }
             return Ok(REFUSED);
         }
         other => other?,

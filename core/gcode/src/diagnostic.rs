@@ -26,8 +26,21 @@ impl fmt::Display for Severity {
     }
 }
 
+/// A place in the path where the tool does not fit, in the plane of the path, machine coordinates in mm.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sketch {
+    /// The axes of the plane, the one to the right first.
+    pub axes: [char; 2],
+    /// The programmed moves around the place: the line of each, and points of its path.
+    pub moves: Vec<(u32, Vec<[f64; 2]>)>,
+    /// Where the tool stands beside the corner.
+    pub tool_at_mm: [f64; 2],
+    /// Its radius.
+    pub tool_radius_mm: f64,
+}
+
 /// One error of a part program, or a warning.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Diagnostic {
     /// Whether it stops the program.
     pub severity: Severity,
@@ -47,6 +60,8 @@ pub struct Diagnostic {
     pub excerpt: String,
     /// Characters of [`Diagnostic::excerpt`] before the caret.
     pub caret: u32,
+    /// What is to be drawn of it: where radius compensation finds no way for the tool.
+    pub sketch: Option<Box<Sketch>>,
 }
 
 impl Diagnostic {
@@ -86,6 +101,7 @@ impl Diagnostic {
             message: fault.message,
             excerpt,
             caret,
+            sketch: fault.sketch,
         }
     }
 }

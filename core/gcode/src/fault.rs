@@ -1,5 +1,7 @@
 //! What went wrong in a line, before it is known which line of which file that is.
 
+use crate::diagnostic::Sketch;
+
 /// Bytes `start..end` of a line, from 0.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Span {
@@ -24,6 +26,8 @@ pub(crate) struct Fault {
     pub message: String,
     /// The line, where it is not the one that is read.
     pub line: Option<Box<SourceLine>>,
+    /// The place in the path, where it is worth to be drawn.
+    pub sketch: Option<Box<Sketch>>,
 }
 
 /// A line that was read before.
@@ -40,6 +44,7 @@ impl Fault {
             code,
             message: message.into(),
             line: None,
+            sketch: None,
         }
     }
 }

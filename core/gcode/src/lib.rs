@@ -61,7 +61,7 @@ pub use check::{CheckReport, MAX_DIAGNOSTICS, check};
 pub use config::{
     Config, DEFAULT_MAX_STEPS, FIRST_USER_COMMAND, LAST_USER_COMMAND, Lines, ProbeInput, Tool,
 };
-pub use diagnostic::{Diagnostic, Severity};
+pub use diagnostic::{Diagnostic, Severity, Sketch};
 pub use interpreter::{Interpreter, MAX_LINE_BYTES};
 pub use item::{Input, InputMode, InputWait, Item, ProbeResult, UserCommand};
 pub use lasting::{Lasting, Ledger, Moment, WORK_SYSTEMS, system_code};

@@ -3,7 +3,8 @@
 //! The page needs no network, no server and no other file: style, script and samples are inside it. It shows the tool
 //! path coloured by feed, and over one shared time axis the path feed, each axis' velocity, acceleration and jerk with
 //! their limits, the path deviation, σ and the following error. What exceeds a limit is red and listed.
-//! [`LatencyReport`] draws how late a thread woke, [`EstimateReport`] what programs are estimated to take.
+//! [`LatencyReport`] draws how late a thread woke, [`EstimateReport`] what programs are estimated to take, [`RefusalReport`]
+//! where a program is refused.
 //!
 //! ```
 //! use tandem_report::{Axis, Report, Samples, Unit};
@@ -37,6 +38,7 @@ mod judge;
 mod latency;
 mod model;
 mod page;
+mod refusal;
 mod sections;
 mod tables;
 mod template;
@@ -46,3 +48,4 @@ mod thin;
 pub use estimate::{EstimateReport, EstimatedField, EstimatedProgram};
 pub use latency::{LatencyBin, LatencyReport, LatencySeries};
 pub use model::{Axis, Ended, Report, Samples, Signal, Unit};
+pub use refusal::{RefusalReport, RefusedPlace};

@@ -3,7 +3,9 @@
 //! A move is kept back until the next one in the plane says what the corner between them is: only then is it known where
 //! it ends. What stands between the two in the program is kept back with it.
 
+mod company;
 mod corner;
+mod sketch;
 
 use std::fmt::Write as _;
 
@@ -12,13 +14,14 @@ use tandem_sdk::{AxisVector, Block, BlockKind};
 use super::arc;
 use super::circle::{Ends, Parts, Point, extent, tolerance_mm};
 use super::modes::Plane;
-use super::{Action, Group, Shape, Word, spindle, tool};
+use super::{Action, Group, Word, spindle, tool};
 use crate::fault::{Checked, Fault};
 use crate::item::Item;
 use crate::line::Line;
-use crate::state::MotionMode;
 use crate::state::path::NO_MOVE;
+pub(crate) use company::refuse_company;
 use corner::{Corner, Track, along, beside, distance, dot, unit};
+use sketch::{Programmed, drawn, gouge};
 
 pub(super) const WORDS: &[Word] = &[
     Word::new(
@@ -86,6 +89,8 @@ pub(crate) struct Compensation {
     /// The axes of the plane.
     plane: [usize; 2],
     held: Vec<Held>,
+    /// The move that is kept back, and the one that makes the corner with it, as they are programmed.
+    programmed_moves: [Option<Programmed>; 2],
     /// A line was wrong: nothing is driven until it is off.
     spoiled: bool,
 }
@@ -101,6 +106,7 @@ impl Default for Compensation {
             direction: [0.0; 2],
             plane: [0, 1],
             held: Vec::new(),
+            programmed_moves: [None; 2],
             spoiled: false,
         }
     }
@@ -264,80 +270,6 @@ fn flush_here(line: &mut Line) -> Checked<()> {
     flush(line, plane, end)
 }
 
-/// What does not go with compensation that is on.
-#[cold]
-pub(crate) fn refuse_company(line: &Line) -> Checked<()> {
-    let word = line.state.compensation.word();
-    let refuse = |group, other: &str, why: &str| {
-        Err(line.orders.fault(
-            group,
-            "compensation",
-            format!("{other} {why} while {word} is on: G40 must come before"),
-        ))
-    };
-    for group in [
-        Group::Units,
-        Group::Plane,
-        Group::CoordinateSystem,
-        Group::ToolLength,
-        Group::ToolChange,
-        Group::User,
-    ] {
-        if let Some(other) = line.orders.get(group)
-            && !changes_nothing(line, other.tenths, group)
-        {
-            return refuse(group, other.code, "cannot act");
-        }
-    }
-    if line
-        .orders
-        .get(Group::InputOutput)
-        .is_some_and(|other| other.tenths == 660)
-    {
-        return refuse(Group::InputOutput, "M66", "cannot wait");
-    }
-    if let Some(other) = line
-        .orders
-        .get(Group::NonModal)
-        .filter(|other| other.tenths != 40)
-    {
-        return refuse(Group::NonModal, other.code, "cannot act");
-    }
-    match line.orders.motion {
-        Some(MotionMode::Word(other))
-            if !matches!(other.shape(), Some(Shape::Straight | Shape::Arc)) =>
-        {
-            let message = format!(
-                "{} does not go with {word}: G40 must come before",
-                other.code
-            );
-            Err(line.motion_fault("compensation", message))
-        }
-        _ => Ok(()),
-    }
-}
-
-/// Whether a word says only what is so already.
-fn changes_nothing(line: &Line, tenths: u16, group: Group) -> bool {
-    let modes = &line.state.modes;
-    match group {
-        Group::Units => (tenths == 210) == (modes.unit_mm == 1.0),
-        Group::Plane => {
-            tenths
-                == match modes.plane {
-                    Plane::Xy => 170,
-                    Plane::Zx => 180,
-                    Plane::Yz => 190,
-                }
-        }
-        Group::CoordinateSystem => {
-            crate::lasting::system_code(line.state.coordinates.active())
-                == super::written('G', tenths)
-        }
-        _ => false,
-    }
-}
-
 /// A straight move from the programmed position before to the one now.
 pub(crate) fn straight(line: &mut Line, kind: BlockKind) -> Checked<()> {
     if line.state.compensation.is_lost(line.state.path.uncertain) {
@@ -362,6 +294,12 @@ pub(crate) fn straight(line: &mut Line, kind: BlockKind) -> Checked<()> {
     if distance(from, to) < NO_MOVE {
         return across(line, plane, kind);
     }
+    line.state.compensation.programmed_moves[1] = Some(Programmed {
+        line: line.state.line,
+        from,
+        to,
+        bend: None,
+    });
     let direction = unit(from, to);
     let end = along(to, beside(direction, side), radius_mm);
     let track = Track::Line {
@@ -400,6 +338,12 @@ pub(crate) fn bent(line: &mut Line, ends: &Ends, parts: &Parts, plane: [usize; 2
     let [begins, ends_in] = [ends.start, ends.end].map(tangent);
     let end = along(ends.end, beside(ends_in, side), radius_mm);
     let clockwise = ends.clockwise;
+    line.state.compensation.programmed_moves[1] = Some(Programmed {
+        line: line.state.line,
+        from: ends.start,
+        to: ends.end,
+        bend: Some((center, clockwise)),
+    });
     let feed_mm_per_s = feed(line, BlockKind::Arc, length_mm)?;
     if line.state.compensation.fresh {
         let at = plane.map(|axis| line.state.path.last_end[axis]);
@@ -426,7 +370,7 @@ pub(crate) fn bent(line: &mut Line, ends: &Ends, parts: &Parts, plane: [usize; 2
                 crate::fault::show(first.arc.radius_mm),
                 crate::fault::show(radius_mm)
             );
-            return Err(line.motion_fault("compensation", message));
+            return Err(drawn(line, line.motion_fault("compensation", message)));
         }
         let offset_mm = if inside {
             first.arc.radius_mm - radius_mm
@@ -530,6 +474,7 @@ fn begin(line: &mut Line, held: Held, direction: Point, programmed: Point) {
     line.state.path.at_rest = false;
     let compensation = &mut line.state.compensation;
     compensation.held.push(held);
+    compensation.programmed_moves = [compensation.programmed_moves[1], None];
     (
         compensation.fresh,
         compensation.direction,
@@ -657,18 +602,6 @@ fn held_line(line: &Line) -> u32 {
             Held::Event(_) => None,
         });
     first.unwrap_or(line.state.line)
-}
-
-/// The tool would cut into what the lines leave.
-#[cold]
-fn gouge(line: &Line, of: u32, why: &str) -> Fault {
-    let (word, now) = (line.state.compensation.word(), line.state.line);
-    let radius = crate::fault::show(line.state.compensation.radius_mm);
-    let message = format!(
-        "with {word} and a tool of radius {radius} mm the moves of the lines {of} and {now} cannot be driven: {why}; a smaller \
-         tool, or another path"
-    );
-    line.motion_fault("gouge", message)
 }
 
 /// Hands out what is kept back: its last move in the plane ends at `end`.

@@ -102,6 +102,34 @@ fn what_would_cut_into_the_part_is_refused_with_both_lines() {
 }
 
 #[test]
+fn the_place_where_the_tool_does_not_fit_is_drawn() {
+    let sketch = |program: &str| {
+        let (_, errors) = crate::testing::run_on(crate::testing::mill(), program);
+        errors[0].sketch.clone().unwrap()
+    };
+    let slot = sketch("F60\nG41.1 D6 G1 X10\nX20\nY2\nX0\nG40 Y9");
+    assert_eq!(slot.axes, ['X', 'Y']);
+    assert_eq!(
+        slot.moves,
+        [
+            (4, vec![[20.0, 0.0], [20.0, 2.0]]),
+            (5, vec![[20.0, 2.0], [0.0, 2.0]])
+        ]
+    );
+    assert_eq!((slot.tool_at_mm, slot.tool_radius_mm), ([17.0, 2.0], 3.0));
+    let arc = sketch("F60\nG41.1 D6 G1 X10\nX20\nG3 X24 Y0 I2 J0\nG40 G1 X0");
+    let (line, points) = arc.moves.last().unwrap();
+    let [from, to] = [points[0], points[points.len() - 1]];
+    assert!(*line == 4 && (from[0] - 20.0).abs() < 1e-9 && (to[0] - 24.0).abs() < 1e-9);
+    assert!(
+        points
+            .iter()
+            .all(|[x, y]| ((x - 22.0).hypot(*y) - 2.0).abs() < 1e-9 && *y < 1e-9)
+    );
+    assert_eq!(arc.tool_at_mm, [20.0, 3.0]);
+}
+
+#[test]
 fn what_does_not_go_with_compensation_is_refused() {
     for other in [
         "G20",
