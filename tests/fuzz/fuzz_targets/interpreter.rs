@@ -3,7 +3,8 @@
 
 use libfuzzer_sys::fuzz_target;
 use tandem_gcode::{Config, Item, ProbeInput, ProbeResult, Program, ProgramError, Stream, check};
-use tandem_sdk::{Axes, Block, BlockKind, Curve};
+use tandem_gcode::Tool;
+use tandem_sdk::{Axes, AxisVector, Block, BlockKind, Curve};
 
 fn config() -> Config {
     let axes = Axes::new(&[('X', false), ('Y', false), ('Z', false), ('A', true)]).expect("four axes");
@@ -11,6 +12,11 @@ fn config() -> Config {
     config.travel_mm[0] = (-1000.0, 1000.0);
     config.probe = Some(ProbeInput { input: 0, inverted: false });
     config.max_steps = 10_000;
+    config.user_commands.extend([101, 150]);
+    for number in [1, 2] {
+        let offset = AxisVector::from_slice(&[0.0, 0.0, 20.0]);
+        config.tools.push(Tool { number, pocket: Some(number), offset, diameter_mm: 2.0 });
+    }
     config
 }
 
