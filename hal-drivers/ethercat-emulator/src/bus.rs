@@ -4,7 +4,7 @@ use crate::description::{BusDescription, DescriptionError, Plug, Switch};
 use crate::device::Device;
 use crate::esc::registers;
 use crate::faults::What;
-use crate::frame::{self, Datagram, datagrams, is_ethercat};
+use crate::frame::{self, Command, Datagram, datagrams, is_ethercat};
 
 /// Most devices of a bus.
 const MAX_DEVICES: usize = 256;
@@ -198,7 +198,10 @@ impl Bus {
 
     /// Lets time pass for every device. Time that goes back is no time.
     pub fn advance(&mut self, now_ns: u64) {
-        self.now_ns = self.now_ns.max(now_ns);
+        if now_ns < self.now_ns {
+            return;
+        }
+        self.now_ns = now_ns;
         for device in &mut self.devices {
             device.advance(self.now_ns);
         }
@@ -219,17 +222,33 @@ impl Bus {
     /// in ns, or nothing where no frame comes back: without devices, or for another protocol. Allocates nothing.
     pub fn pass(&mut self, now_ns: u64, frame: &mut [u8]) -> Option<u64> {
         self.advance(now_ns);
-        if !is_ethercat(frame) || self.unplugged || self.devices.is_empty() {
+        if !is_ethercat(frame) {
             return None;
         }
+        self.read(frame);
+        self.pass_read(frame)
+    }
+
+    /// Finds the datagrams of a frame, which [`Bus::pass_read`] passes; whether process data are among them.
+    pub(crate) fn read(&mut self, frame: &[u8]) -> bool {
         self.found.clear();
         self.found.extend(datagrams(frame));
+        let logical = |datagram: &Datagram| matches!(datagram.command, Command::Logical { .. });
+        self.found.iter().any(logical)
+    }
+
+    /// Passes the frame whose datagrams were found last, at the time up to which the devices have lived.
+    pub(crate) fn pass_read(&mut self, frame: &mut [u8]) -> Option<u64> {
+        if self.unplugged || self.devices.is_empty() {
+            return None;
+        }
         for (device, cable) in self.devices.iter_mut().zip(&self.cables) {
             let Some(arrival_ns) = cable.arrival_ns else {
                 continue;
             };
             let at_ns = self.now_ns + arrival_ns;
             device.advance(at_ns);
+            device.frame_comes();
             for datagram in &self.found {
                 device.pass(at_ns, datagram, frame);
             }

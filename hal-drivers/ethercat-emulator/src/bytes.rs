@@ -17,11 +17,19 @@ pub(crate) fn u64_at(bytes: &[u8], at: usize) -> u64 {
 
 /// A number of `length` bytes, at most 8, at `at`; bytes that are not there are 0.
 pub(crate) fn number_at(bytes: &[u8], at: usize, length: usize) -> u64 {
-    let mut whole = [0; 8];
     let there = bytes.get(at..).unwrap_or_default();
-    let count = there.len().min(length).min(8);
-    whole[..count].copy_from_slice(&there[..count]);
-    u64::from_le_bytes(whole)
+    match there[..there.len().min(length)] {
+        [] => 0,
+        [a] => u64::from(a),
+        [a, b] => u64::from(u16::from_le_bytes([a, b])),
+        [a, b, c, d] => u64::from(u32::from_le_bytes([a, b, c, d])),
+        ref some => {
+            let mut whole = [0; 8];
+            let count = some.len().min(8);
+            whole[..count].copy_from_slice(&some[..count]);
+            u64::from_le_bytes(whole)
+        }
+    }
 }
 
 /// Writes the low bytes of `value` over `into`, at most 8.

@@ -80,6 +80,10 @@ impl Device {
             if self.esc.clock.sync_due(until_ns.min(tick)).is_some() {
                 self.sync0();
             } else if tick <= until_ns {
+                if self.is_idle(until_ns) {
+                    self.next_tick_ns = (until_ns / STEP_NS + 1) * STEP_NS;
+                    continue;
+                }
                 self.tick(tick);
                 self.next_tick_ns += STEP_NS;
             } else {
@@ -261,8 +265,10 @@ impl Device {
         match (&mut self.firmware.drive, self.channels.inputs.get(input)) {
             (Some(drive), _) => drive.set_probe(input, on),
             (None, Some(slot)) => {
-                self.firmware.dictionary.set(*slot, i64::from(on));
-                self.publish_inputs();
+                if (self.firmware.dictionary.unsigned(*slot) == 1) != on {
+                    self.firmware.dictionary.set(*slot, i64::from(on));
+                    self.publish_inputs();
+                }
             }
             (None, None) => {}
         }

@@ -153,9 +153,3 @@ impl Iterator for Datagrams<'_> {
         })
     }
 }
-
-/// Whether a frame carries process data.
-pub(crate) fn is_cyclic(frame: &[u8]) -> bool {
-    is_ethercat(frame)
-        && datagrams(frame).any(|datagram| matches!(datagram.command, Command::Logical { .. }))
-}

@@ -32,7 +32,7 @@ pub use description::{
     Switch,
 };
 pub use device::Device;
-pub use drive::{DriveDescription, DriveState};
+pub use drive::{Cut, DriveDescription, DriveState};
 pub use faults::{Fault, SdoRefusal, Span, What, When};
 pub use firmware::Counters;
 pub use frame::{ETHERTYPE, is_ethercat};

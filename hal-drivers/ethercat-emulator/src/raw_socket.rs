@@ -67,6 +67,18 @@ impl RawSocket {
         })
     }
 
+    /// Whether frames can be sent and received now.
+    ///
+    /// # Errors
+    /// The interface is down, or something is wrong with it.
+    pub fn judge(&self) -> Result<(), RawError> {
+        // A socket that was bound to an interface that is down says so by an error that waits; it is told once.
+        match self.socket.take_error() {
+            Ok(None) => Ok(()),
+            Ok(Some(error)) | Err(error) => Err(self.failed(error)),
+        }
+    }
+
     /// Waits for a frame for at most `timeout_ns`.
     pub fn wait(&self, timeout_ns: u64) {
         let timeout = Timespec {

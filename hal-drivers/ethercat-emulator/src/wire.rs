@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use crate::bus::{Bus, MAX_FRAME};
 use crate::description::{BusDescription, DescriptionError};
 use crate::faults::{Fault, Span, What, When};
-use crate::frame::{is_cyclic, is_ethercat};
+use crate::frame::is_ethercat;
 
 /// Replies that wait; a master that reads none loses the oldest.
 const MAX_REPLIES: usize = 256;
@@ -151,6 +151,15 @@ impl Wire {
         Ok(())
     }
 
+    /// Ends every fault that is there now: cables are plugged again, devices do as they should.
+    pub fn mend(&mut self) {
+        for index in 0..self.faults.len() {
+            if self.faults[index].state == Progress::Active {
+                self.end(index);
+            }
+        }
+    }
+
     /// The bus.
     pub fn bus(&self) -> &Bus {
         &self.bus
@@ -265,7 +274,7 @@ impl Wire {
             return;
         }
         self.frames += 1;
-        let cyclic = is_cyclic(frame);
+        let cyclic = self.bus.read(frame);
         self.cycles += u64::from(cyclic);
         self.schedule(now_ns, cyclic);
         let fate = self.fate();
@@ -273,7 +282,7 @@ impl Wire {
             return;
         }
         let mut reply = self.buffer(frame);
-        let Some(travel_ns) = self.bus.pass(now_ns, &mut reply) else {
+        let Some(travel_ns) = self.bus.pass_read(&mut reply) else {
             self.free.push(reply);
             return;
         };

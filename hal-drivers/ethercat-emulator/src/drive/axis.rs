@@ -1,6 +1,6 @@
 //! The axis that a drive moves: a position loop around a velocity loop around an inertia.
 
-use super::description::DriveDescription;
+use super::description::{Cut, DriveDescription};
 
 /// Deceleration by the brake, as a multiple of the rated one.
 const BRAKE: f64 = 2.0;
@@ -59,12 +59,13 @@ impl Axis {
         torque_limit: f64,
     ) {
         let rated = of.rated_acceleration_counts_per_s2;
+        let load = self.load + self.cutting(of);
         let acceleration = match power {
             Power::Motor => {
                 let asked = of.position_gain_per_s * (self.demand - self.position) + feed_forward;
-                let torque = (asked - self.velocity) / of.velocity_lag_s / rated + self.load;
+                let torque = (asked - self.velocity) / of.velocity_lag_s / rated + load;
                 self.torque = torque.clamp(-torque_limit, torque_limit);
-                (self.torque - self.load) * rated
+                (self.torque - load) * rated
             }
             Power::Brake | Power::None => {
                 self.torque = 0.0;
@@ -85,6 +86,14 @@ impl Axis {
         if power != Power::Motor {
             self.settle();
         }
+    }
+
+    /// Torque of what is cut here at this speed, as a share of the rated one.
+    fn cutting(&self, of: &DriveDescription) -> f64 {
+        let place = self.place();
+        let here = |cut: &&Cut| (cut.from_counts..cut.to_counts).contains(&place);
+        let shares = of.cuts.iter().filter(here);
+        shares.map(|cut| cut.torque_share_s_per_count).sum::<f64>() * self.velocity
     }
 
     /// The demand is where the axis is.

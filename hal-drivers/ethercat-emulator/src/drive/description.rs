@@ -30,6 +30,8 @@ pub struct DriveDescription {
     pub home_switch_counts: Option<f64>,
     /// Above which position each touch probe is on.
     pub probes_counts: [Option<f64>; 2],
+    /// Where a process holds against the axis.
+    pub cuts: Vec<Cut>,
     /// Deceleration of a quick stop at power-on, object 6085, in counts/s².
     pub quick_stop_deceleration_counts_per_s2: u32,
     /// Following error at power-on that is a fault, object 6065, in counts.
@@ -60,6 +62,7 @@ impl Default for DriveDescription {
             positive_limit_counts: None,
             home_switch_counts: None,
             probes_counts: [None; 2],
+            cuts: vec![],
             quick_stop_deceleration_counts_per_s2: 40_000_000,
             following_error_window_counts: 100_000,
             following_error_time_ms: 10,
@@ -68,6 +71,18 @@ impl Default for DriveDescription {
             emergency: true,
         }
     }
+}
+
+/// A stretch of the axis in which a process holds against it, the more the faster it goes: a cut.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Cut {
+    /// Where it begins.
+    pub from_counts: f64,
+    /// Where it ends.
+    pub to_counts: f64,
+    /// Torque of the process, as a share of the rated one, for a velocity of 1 count/s.
+    pub torque_share_s_per_count: f64,
 }
 
 /// Modes that this drive can do at all.
@@ -97,6 +112,18 @@ impl DriveDescription {
             return Err(format!(
                 "drive.velocity_lag_s is {shortest} to 1, and position_gain_per_s at most half its inverse"
             ));
+        }
+        let fits = |cut: &Cut| {
+            let share = cut.torque_share_s_per_count;
+            // Beyond this it would brake the axis by more than its speed within a step of the drive's loop.
+            let most = 0.5 / shortest / self.rated_acceleration_counts_per_s2;
+            cut.from_counts < cut.to_counts && (0.0..=most).contains(&share)
+        };
+        if !self.cuts.iter().all(fits) {
+            return Err(
+                "drive.cuts begin before they end, with 0 or a little torque for a count/s"
+                    .to_string(),
+            );
         }
         let times = [
             ("brake_open_ms", self.brake_open_ms),

@@ -9,7 +9,7 @@ mod probe;
 mod state;
 mod trouble;
 
-pub use description::DriveDescription;
+pub use description::{Cut, DriveDescription};
 pub(crate) use objects::{default_pdos, judge_write};
 pub use state::DriveState;
 pub(crate) use trouble::{Lasting, Trouble};
@@ -281,7 +281,6 @@ impl Drive {
             .step(&self.of, STEP_S, power, self.feed_forward, limit);
         self.catch(before, dictionary);
         self.watch_following(dictionary);
-        self.publish(dictionary);
     }
 
     fn take_mode(&mut self, dictionary: &Dictionary) {

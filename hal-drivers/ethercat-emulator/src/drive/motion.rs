@@ -185,8 +185,8 @@ impl Drive {
         }
     }
 
-    /// Puts what the master can read into the dictionary.
-    pub(super) fn publish(&mut self, dictionary: &mut Dictionary) {
+    /// Puts what the master can read into the dictionary, before it is read: the drive's own loop looks at none of it.
+    pub(crate) fn publish(&self, dictionary: &mut Dictionary) {
         let slots = self.slots;
         let switches = self.switches();
         let shown = |counts: f64| counts.round() as i64;

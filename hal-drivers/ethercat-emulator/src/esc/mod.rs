@@ -249,6 +249,15 @@ impl Esc {
         writes: bool,
     ) -> (bool, bool) {
         let (mut read, mut written) = (false, false);
+        let units = &self.fmmus[..self.extent.fmmus];
+        let meant = |unit: &Fmmu| {
+            (unit.reads && reads || unit.writes && writes)
+                && unit.overlap(address, data.len()).is_some()
+        };
+        if !units.iter().any(meant) {
+            // Most datagrams of a frame are another device's.
+            return (false, false);
+        }
         let mut buffer = [0; crate::frame::MAX_DATA];
         // What is written is taken before what is read lies over it: both may be the same logical bytes.
         for unit in self.fmmus {
@@ -299,14 +308,14 @@ impl Esc {
 
     /// Whether process data are watched and too old.
     pub(crate) fn watchdog_expired(&self, at_ns: u64) -> bool {
-        let watched = self
-            .sync_managers
-            .iter()
-            .any(|manager| manager.is_active() && manager.triggers_watchdog());
         let (Some(limit), Some(last)) = (self.watchdog_ns(), self.last_trigger_ns) else {
             return false;
         };
-        watched && at_ns.saturating_sub(last) > limit
+        at_ns.saturating_sub(last) > limit
+            && self
+                .sync_managers
+                .iter()
+                .any(|manager| manager.is_active() && manager.triggers_watchdog())
     }
 
     /// Counts a watchdog that ran out, and lets it wait for the next write.

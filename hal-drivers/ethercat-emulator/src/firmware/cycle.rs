@@ -88,8 +88,16 @@ impl Device {
         }
     }
 
+    /// A frame comes: where frames lead, it finds what the firmware's loop came to last.
+    pub(crate) fn frame_comes(&mut self) {
+        if self.firmware.state >= AlState::SafeOp && !self.is_synchronous() {
+            self.publish_inputs();
+        }
+    }
+
     /// Lets the master read the newest inputs.
     pub(crate) fn publish_inputs(&mut self) {
+        self.publish_drive();
         let firmware = &self.firmware;
         for mapping in firmware
             .mappings
@@ -98,6 +106,23 @@ impl Device {
         {
             mapping.pack(&firmware.dictionary, self.esc.fill(mapping.manager));
         }
+    }
+
+    /// Puts what a drive shows into the dictionary.
+    fn publish_drive(&mut self) {
+        let firmware = &mut self.firmware;
+        if let Some(drive) = &firmware.drive {
+            drive.publish(&mut firmware.dictionary);
+        }
+    }
+
+    /// Whether nothing happens in the firmware's own loop until then: a terminal that waits for its master.
+    pub(crate) fn is_idle(&self, until_ns: u64) -> bool {
+        let firmware = &self.firmware;
+        let waits = firmware.change.is_some() || firmware.mail_due_ns.is_some();
+        firmware.drive.is_none()
+            && !waits
+            && (firmware.state != AlState::Op || !self.esc.watchdog_expired(until_ns))
     }
 
     /// One step of the firmware's own loop.
@@ -113,9 +138,6 @@ impl Device {
                 mailbox.emergency(code, 1);
                 self.post();
             }
-        }
-        if self.firmware.state >= AlState::SafeOp && !self.is_synchronous() {
-            self.publish_inputs();
         }
     }
 
@@ -189,6 +211,7 @@ impl Device {
             return;
         }
         self.firmware.mail_due_ns = None;
+        self.publish_drive();
         let (Some(plan), Some(mailbox)) = (self.plan.mailbox, &mut self.firmware.mailbox) else {
             return;
         };
