@@ -8,6 +8,7 @@ mod collected;
 mod drive;
 mod echo;
 mod machine;
+mod namespace;
 mod random;
 mod record;
 
@@ -18,6 +19,7 @@ pub use collected::Collected;
 pub use drive::{Away, Given, Offer, drive, feed, stream};
 pub use echo::Echo;
 pub use machine::{axis, context};
+pub use namespace::{BUS_END, MASTER_END, program_beside, with_cable};
 pub use random::Random;
 pub use record::{CASES_VARIABLE, record_case};
 
