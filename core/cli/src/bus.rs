@@ -4,7 +4,9 @@ use std::error::Error;
 use std::io::Write;
 use std::path::Path;
 
-use tandem_ethercat::{Found, Options, Survey, Value, Watched, context_of, number, object, watch};
+use tandem_ethercat::{
+    Found, Object, Options, Survey, Value, Watch, Watched, context_of, number, object, watch,
+};
 use tandem_machine::Machine;
 use tandem_sdk::PluginOptions;
 
@@ -28,12 +30,16 @@ pub fn bus(command: &args::Bus) -> Result<u8, Box<dyn Error>> {
             which,
         }) => write(which, *device, object, *bits, value),
         args::Bus::State { which } => state(which),
-        args::Bus::Watch { machine, seconds } => watch_bus(machine, None, *seconds),
+        args::Bus::Watch {
+            machine,
+            seconds,
+            objects,
+        } => watch_bus(machine, None, *seconds, objects),
         args::Bus::Pcap {
             file,
             machine,
             seconds,
-        } => watch_bus(machine, Some(file), *seconds),
+        } => watch_bus(machine, Some(file), *seconds, &[]),
     }
 }
 
@@ -80,6 +86,7 @@ fn scan(which: &Which) -> Result<u8, Box<dyn Error>> {
             clock,
             maps,
             modes,
+            reactions,
         } = device;
         let clock = if *clock { ", clock" } else { "" };
         let alias = if identity.alias == 0 {
@@ -101,6 +108,9 @@ fn scan(which: &Which) -> Result<u8, Box<dyn Error>> {
         }
         if !modes.is_empty() {
             writeln!(out, "#    modes: {}", modes.join(", "))?;
+        }
+        for reaction in reactions {
+            writeln!(out, "#    {reaction}")?;
         }
     }
     for (
@@ -134,18 +144,8 @@ fn scan(which: &Which) -> Result<u8, Box<dyn Error>> {
 fn read(which: &Which, device: usize, text: &str) -> Result<u8, Box<dyn Error>> {
     let (index, sub) =
         object(text).ok_or_else(|| format!("{text:?} is no object: 0x6085, or 0x6099:1"))?;
-    let Value { number, bits } = survey(which)?.read(device, index, sub)?;
-    let signed = i64::from(number)
-        - if number >> (bits - 1) & 1 == 1 {
-            1 << bits
-        } else {
-            0
-        };
-    let digits = usize::from(bits / 4);
-    writeln!(
-        std::io::stdout(),
-        "{index:04X}:{sub:02X} = 0x{number:0digits$x}, {number}, {signed} with a sign, {bits} bits"
-    )?;
+    let value = survey(which)?.read(device, index, sub)?;
+    writeln!(std::io::stdout(), "{index:04X}:{sub:02X} = {value}")?;
     Ok(0)
 }
 
@@ -183,15 +183,34 @@ fn state(which: &Which) -> Result<u8, Box<dyn Error>> {
     Ok(0)
 }
 
-fn watch_bus(path: &Path, record: Option<&Path>, seconds: f64) -> Result<u8, Box<dyn Error>> {
+/// An object of a device, `2:0x6079` or `2:0x6099:1`.
+fn object_of(text: &str) -> Result<Object, String> {
+    let parts = text.split_once(':');
+    let found = parts.and_then(|(place, of)| Some((place.parse().ok()?, object(of)?)));
+    let (place, (index, sub)) = found
+        .ok_or_else(|| format!("{text:?} is no object of a device: 2:0x6079, or 2:0x6099:1"))?;
+    Ok(Object { place, index, sub })
+}
+
+fn watch_bus(
+    path: &Path,
+    record: Option<&Path>,
+    time_s: f64,
+    objects: &[String],
+) -> Result<u8, Box<dyn Error>> {
     let (options, fine_period_s) = options_of(path)?;
+    let objects: Result<Vec<_>, _> = objects.iter().map(|text| object_of(text)).collect();
+    let what = Watch {
+        record,
+        time_s,
+        objects: &objects?,
+    };
     let mut shown: Vec<Watched> = vec![];
     let mut last = None;
     watch(
         &options,
         fine_period_s,
-        record,
-        seconds,
+        &what,
         |devices, counters, phase_ns| {
             for device in devices.iter().filter(|device| !shown.contains(device)) {
                 let status = device
@@ -202,7 +221,12 @@ fn watch_bus(path: &Path, record: Option<&Path>, seconds: f64) -> Result<u8, Box
                     .lost
                     .as_ref()
                     .map_or(String::new(), |lost| format!(", lost: {lost}"));
-                say!("{}: {}{status}{lost}", device.called, device.state);
+                let objects: String = device
+                    .objects
+                    .iter()
+                    .map(|object| format!(", {object}"))
+                    .collect();
+                say!("{}: {}{status}{lost}{objects}", device.called, device.state);
             }
             shown = devices.to_vec();
             last = Some((*counters, phase_ns));

@@ -6,16 +6,18 @@ use ethercrab::subdevice_group::DcConfiguration;
 use ethercrab::{Command, DcSync, MainDevice, SubDeviceGroup};
 use tandem_sdk::DriverContext;
 
+use crate::beside::Mailboxes;
 use crate::check::MAX_DEVICES;
 use crate::coe::Objects;
 use crate::cyclic::{Area, Station};
 use crate::drive::{self, Constants, Drive, Moves};
 use crate::options::{DeviceOptions, MapBy, Options, Sync, object, pair};
+use crate::reactions::REACTIONS;
 use crate::time;
 use crate::words::{al_code, al_state};
 
 /// Most bytes of process data of all devices.
-const MAX_BYTES: usize = 1400;
+pub(crate) const MAX_BYTES: usize = 1400;
 
 type Group = SubDeviceGroup<MAX_DEVICES, MAX_BYTES>;
 
@@ -77,6 +79,8 @@ pub(crate) struct Up {
     pub(crate) devices: Vec<Ready>,
     /// The station whose clock leads.
     pub(crate) reference: Option<u16>,
+    /// By which their objects are reached from then on.
+    pub(crate) mailboxes: Mailboxes,
 }
 
 /// Brings a bus up.
@@ -146,7 +150,7 @@ pub(crate) async fn bring_up(
             drive,
         });
     }
-    if dc {
+    let mailboxes = if dc {
         let period = Duration::from_secs_f64(context.fine_period_s);
         let start_delay = Duration::from_millis(FIRST_SYNC_MS);
         let configuration = DcConfiguration {
@@ -155,16 +159,20 @@ pub(crate) async fn bring_up(
             sync0_shift: Duration::ZERO,
         };
         let configured = mapped.configure_dc_sync(main, configuration).await;
-        configured.map_err(|error| {
+        let mapped = configured.map_err(|error| {
             format!("distributed clocks: {error}; sync = \"free-run\" does without them")
         })?;
-    }
+        Mailboxes::Clocks(Box::new(mapped))
+    } else {
+        Mailboxes::FreeRun(Box::new(mapped))
+    };
     for device in &ready {
         step(main, device, 4).await?;
     }
     Ok(Up {
         devices: ready,
         reference,
+        mailboxes,
     })
 }
 
@@ -359,6 +367,9 @@ async fn set_up(
     let Some((constants, limits_torque)) = drive else {
         return Ok(None);
     };
+    for reaction in &REACTIONS {
+        reaction.judge(&objects, &device.reactions).await?;
+    }
     let [out, back] = drive::wanted(device, limits_torque);
     if device.map == MapBy::Driver {
         objects.map(0x1C12, 0x1600, &out).await?;
@@ -396,21 +407,6 @@ async fn judge_drive(
     }
     if matches!(moves, Moves::Joint(_)) {
         set_period(objects, period_s).await?;
-    }
-    // Stops that leave the axis to run out would not be the ramps that the machine counts on.
-    for (index, allowed, meaning) in [
-        (0x605A, &[1, 2, 3, 4, 5, 6, 7, 8][..], "on a quick stop"),
-        (0x605E, &[0, 1, 2, 3, 4][..], "on a fault"),
-        (0x6007, &[0, 1, 2, 3][..], "when the bus is lost"),
-    ] {
-        if let Some(value) = objects.read_if_there(index, 0, 2).await?
-            && !allowed.contains(&i32::from((value as u16).cast_signed()))
-        {
-            let value = (value as u16).cast_signed();
-            return Err(format!(
-                "{called}: what it does {meaning} ({index:04X}) is {value}; set it with startup = [{{ sdo = \"0x{index:04X}\", i16 = … }}]"
-            ));
-        }
     }
     let rated = match device.rated_current_a {
         Some(rated) => rated,

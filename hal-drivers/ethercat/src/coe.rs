@@ -1,9 +1,12 @@
 //! Objects of a device, read and written by SDO.
 
 use ethercrab::error::{CoeAbortCode, Error, MailboxError};
+use std::ops::Deref;
+
 use ethercrab::{SubDevice, SubDeviceRef};
 
 use crate::map::{Entry, Map};
+use crate::survey::Value;
 
 /// How often an SDO is asked for again behind an emergency message, which `ethercrab` takes for its answer.
 const EMERGENCIES: u32 = 4;
@@ -12,8 +15,8 @@ const EMERGENCIES: u32 = 4;
 const MAX_ENTRIES: u8 = 64;
 
 /// The objects of one device; its words name it.
-pub(crate) struct Objects<'a, 'm> {
-    pub(crate) device: &'a SubDeviceRef<'m, &'a SubDevice>,
+pub(crate) struct Objects<'a, 'm, S = &'a SubDevice> {
+    pub(crate) device: &'a SubDeviceRef<'m, S>,
     pub(crate) called: &'a str,
 }
 
@@ -30,7 +33,7 @@ macro_rules! patiently {
     }};
 }
 
-impl Objects<'_, '_> {
+impl<S: Deref<Target = SubDevice>> Objects<'_, '_, S> {
     fn failed(&self, doing: &str, index: u16, sub: u8, error: &Error) -> String {
         let why = match error {
             Error::Mailbox(MailboxError::Aborted { code, .. }) => format!("it refuses: {code}"),
@@ -51,6 +54,23 @@ impl Objects<'_, '_> {
             _ => patiently!(self.device.sdo_read::<u32>(index, sub)),
         };
         value.map_err(|error| self.failed("reading", index, sub, &error))
+    }
+
+    /// Reads a number of as many bytes as the device gives.
+    pub(crate) async fn read_any(&self, index: u16, sub: u8) -> Result<Value, String> {
+        let mut refused = String::new();
+        for bytes in [4_u8, 2, 1] {
+            match self.read(index, sub, usize::from(bytes)).await {
+                Ok(number) => {
+                    return Ok(Value {
+                        number,
+                        bits: bytes * 8,
+                    });
+                }
+                Err(words) => refused = words,
+            }
+        }
+        Err(refused)
     }
 
     /// Reads a number where the device has the object.

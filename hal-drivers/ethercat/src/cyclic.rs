@@ -173,13 +173,19 @@ impl Cyclic {
             .is_none_or(|(place, counts)| self.counter(place) == counts)
     }
 
+    /// Whether a clock leads.
+    pub(crate) fn has_clock(&self) -> bool {
+        self.clock.is_some()
+    }
+
     /// Time of the clock that leads, ns; none where there is none, or it did not answer.
     pub(crate) fn clock_ns(&self) -> Option<u64> {
-        let place = self.clock.filter(|place| self.counter(*place) > 0)?;
+        let place = self.clock?;
         let bytes = self.reply[place.data..place.data + 8]
             .try_into()
             .unwrap_or_default();
-        Some(u64::from_le_bytes(bytes))
+        // The frame leaves with no time in it, and the devices behind count that they have taken it all the same.
+        Some(u64::from_le_bytes(bytes)).filter(|ns| *ns > 0)
     }
 
     /// The state of the device that was asked for it; none where it did not answer.
@@ -227,6 +233,12 @@ impl Cyclic {
         self.frame[at..at + 4].copy_from_slice(&self.number.to_le_bytes());
         self.frame[FIRST + 1] = self.number as u8;
         link.send(&self.frame);
+    }
+
+    /// Sends the frame as it is once more, and takes whatever comes first for its reply; whether anything did.
+    pub(crate) fn send_again(&mut self, link: &mut Link, until_ns: u64) -> bool {
+        link.send(&self.frame);
+        link.receive(until_ns, &mut self.reply).is_some()
     }
 
     /// Waits for the reply until `until_ns`; whether it came. Other frames that come are left out.

@@ -9,6 +9,7 @@
     reason = "the futures of ethercrab hold its group of devices"
 )]
 
+mod beside;
 mod bring_up;
 mod bus;
 mod check;
@@ -21,6 +22,7 @@ mod map;
 mod master;
 mod options;
 mod probe;
+mod reactions;
 mod recorder;
 mod survey;
 mod time;
@@ -31,9 +33,9 @@ pub use bus::Counters;
 pub use driver::EthercatDrives;
 pub use options::{
     AnalogOptions, CodeOptions, DeviceOptions, Encoder, HomingOptions, MapBy, Mode, Options,
-    ProbeOptions, SpindleMode, SpindleOptions, StartupOptions, Sync,
+    ProbeOptions, ReactionOptions, SpindleMode, SpindleOptions, StartupOptions, Sync,
 };
-pub use survey::{Found, State, Survey, Value, Watched, context_of, watch};
+pub use survey::{Found, Object, State, Survey, Value, Watch, Watched, context_of, watch};
 
 /// Index and sub-index of an object as people write it, `0x6085` or `0x6099:1`. Any loop; does not allocate.
 pub fn object(text: &str) -> Option<(u16, u8)> {

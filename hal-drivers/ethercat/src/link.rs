@@ -1,14 +1,13 @@
 //! What frames go over: a network interface, or the emulator in this process on virtual or real time.
 
-use std::fs::File;
+use std::io::ErrorKind;
+use std::os::linux::net::SocketAddrExt;
+use std::os::unix::net::{SocketAddr, UnixDatagram};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
 use crate::recorder::Recorder;
 use tandem_ethercat_emulator::{BusDescription, MAX_FRAME, RawSocket, Wire, is_ethercat};
-
-/// How long an emulated bus on the wall clock is not looked at where nothing is on its way.
-const DOZE: Duration = Duration::from_micros(20);
 
 /// How long a wire is listened to before anything is sent: three cycles of another master that sends every 10 ms.
 const LISTEN_NS: u64 = 30_000_000;
@@ -29,14 +28,18 @@ enum Medium {
     Interface {
         socket: RawSocket,
         buffer: Box<[u8; MAX_FRAME]>,
-        _lock: File,
+        _lock: UnixDatagram,
     },
 }
 
 impl Link {
     /// The emulator, with its devices just powered on.
+    ///
+    /// In real time a reply is back at once: whoever sleeps for the time that a frame takes on a cable is woken much later on a
+    /// computer with other work, and the period is missed.
     pub(crate) fn emulated(bus: &BusDescription, real_time: bool) -> Result<Self, String> {
-        let wire = Wire::new(bus).map_err(|error| format!("the emulated bus: {error}"))?;
+        let mut wire = Wire::new(bus).map_err(|error| format!("the emulated bus: {error}"))?;
+        wire.set_travel(!real_time);
         Ok(Self {
             medium: Medium::Emulated(Box::new(wire)),
             opened: real_time.then(Instant::now),
@@ -60,6 +63,9 @@ impl Link {
             virtual_ns: 0,
             recorder: None,
         };
+        if let Medium::Interface { socket, .. } = &mut link.medium {
+            socket.judge().map_err(|error| error.to_string())?;
+        }
         let mut frame = [0; MAX_FRAME];
         let until_ns = link.now_ns() + LISTEN_NS;
         while let Some(length) = link.receive(until_ns, &mut frame) {
@@ -129,23 +135,26 @@ impl Link {
         }
         loop {
             let now_ns = self.now_ns();
-            match &mut self.medium {
+            let next_ns = match &mut self.medium {
                 Medium::Emulated(wire) => {
                     if let Some(length) = wire.receive(now_ns, into) {
                         return Some(length);
                     }
+                    // What is not on its way yet does not come: nothing happens behind this thread's back.
+                    wire.next_reply_ns().filter(|due_ns| *due_ns <= until_ns)?
                 }
                 Medium::Interface { socket, buffer, .. } => {
                     if let Ok(Some(frame)) = socket.receive(buffer) {
                         into[..frame.len()].copy_from_slice(frame);
                         return Some(frame.len());
                     }
+                    until_ns
                 }
-            }
+            };
             if now_ns >= until_ns {
                 return None;
             }
-            self.doze(until_ns - now_ns);
+            self.doze(next_ns.saturating_sub(now_ns));
         }
     }
 
@@ -160,7 +169,7 @@ impl Link {
 
     fn doze(&self, at_most_ns: u64) {
         match &self.medium {
-            Medium::Emulated(_) => std::thread::sleep(DOZE.min(Duration::from_nanos(at_most_ns))),
+            Medium::Emulated(_) => std::thread::sleep(Duration::from_nanos(at_most_ns)),
             Medium::Interface { socket, .. } => socket.wait(at_most_ns),
         }
     }
@@ -176,21 +185,14 @@ impl Link {
     }
 }
 
-/// Takes an interface for this process alone, for as long as the file lives.
-fn lock(name: &str) -> Result<File, String> {
-    let path = std::env::temp_dir().join(format!("tandem-ethercat-{name}.lock"));
-    let file = File::options().create(true).append(true).open(&path);
-    let file = file.map_err(|error| {
-        format!(
-            "the lock of the interface {name}: {}: {error}",
-            path.display()
-        )
-    })?;
-    match file.try_lock() {
-        Ok(()) => Ok(file),
-        Err(_) => Err(format!(
-            "another process drives the interface {name} (it holds {})",
-            path.display()
-        )),
-    }
+/// Takes an interface for this process alone, for as long as the socket lives. Its name is known in the network namespace of the
+/// interface and nowhere else, and nothing of it is left when a process is killed.
+fn lock(name: &str) -> Result<UnixDatagram, String> {
+    let address = SocketAddr::from_abstract_name(format!("tandem-ethercat-{name}"));
+    address
+        .and_then(|address| UnixDatagram::bind_addr(&address))
+        .map_err(|error| match error.kind() {
+            ErrorKind::AddrInUse => format!("another process drives the interface {name}"),
+            _ => format!("the lock of the interface {name}: {error}"),
+        })
 }

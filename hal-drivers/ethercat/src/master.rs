@@ -9,6 +9,7 @@ use std::time::Duration;
 use ethercrab::{MainDevice, MainDeviceConfig, PduRx, PduStorage, PduTx, RetryBehaviour, Timeouts};
 use tandem_ethercat_emulator::MAX_FRAME;
 
+use crate::bus::Bus;
 use crate::link::Link;
 use crate::time;
 
@@ -93,14 +94,36 @@ impl Master {
             if let Poll::Ready(output) = future.as_mut().poll(&mut context) {
                 return output;
             }
-            ports.turn(link);
+            ports.turn(link, u64::MAX);
+        }
+    }
+
+    /// Runs what `job` makes of the main device to its end, in the time that the exchanges of a bus leave.
+    pub(crate) fn run_beside<'a, F: Future>(
+        &'a mut self,
+        bus: &mut Bus,
+        job: impl FnOnce(&'a MainDevice<'static>) -> F,
+    ) -> F::Output {
+        let Self { main, ports, .. } = self;
+        time::set(bus.link_mut().now_ns());
+        let mut future = pin!(job(main));
+        let mut context = Context::from_waker(Waker::noop());
+        loop {
+            time::set(bus.link_mut().now_ns());
+            if let Poll::Ready(output) = future.as_mut().poll(&mut context) {
+                return output;
+            }
+            match bus.gap_ends_ns() {
+                Some(until_ns) => ports.turn(bus.link_mut(), until_ns),
+                None => bus.turn(),
+            }
         }
     }
 }
 
 impl Ports {
-    /// Sends what waits, and takes in what comes within a step.
-    fn turn(&mut self, link: &mut Link) {
+    /// Sends what waits, and takes in what comes within a step, or until then.
+    fn turn(&mut self, link: &mut Link, until_ns: u64) {
         while let Some(frame) = self.tx.next_sendable_frame() {
             // A frame that cannot be sent is one that is not answered.
             let _ = frame.send_blocking(|bytes| {
@@ -109,10 +132,12 @@ impl Ports {
             });
         }
         let mut reply = [0; MAX_FRAME];
-        let until_ns = link.now_ns() + STEP_NS;
+        let until_ns = until_ns.min(link.now_ns() + STEP_NS);
         if let Some(length) = link.receive(until_ns, &mut reply) {
             // What it does not know is its own matter: a reply that comes too late, or is another master's.
             let _ = self.rx.receive_frame(&reply[..length]);
+        } else {
+            link.wait_until(until_ns);
         }
     }
 }

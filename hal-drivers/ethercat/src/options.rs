@@ -97,6 +97,25 @@ pub struct StartupOptions {
     pub i32: Option<i32>,
 }
 
+/// What a drive is to do by itself, as its objects 605A to 605E and 6007 say it in numbers. What is stated is compared at every
+/// start.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ReactionOptions {
+    /// On a quick stop (605A).
+    pub quick_stop: Option<i16>,
+    /// On a shutdown (605B).
+    pub shutdown: Option<i16>,
+    /// When its operation is disabled (605C).
+    pub disable: Option<i16>,
+    /// On a halt (605D).
+    pub halt: Option<i16>,
+    /// On a fault of its own (605E).
+    pub fault: Option<i16>,
+    /// When the bus is lost (6007).
+    pub bus_lost: Option<i16>,
+}
+
 /// An analog value among the inputs of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -200,6 +219,9 @@ pub struct DeviceOptions {
     pub probe: Option<ProbeOptions>,
     /// Speeds of homing by the drive.
     pub homing: Option<HomingOptions>,
+    /// What it is to do by itself on stops, faults and a lost bus.
+    #[serde(default)]
+    pub reactions: ReactionOptions,
     /// Objects that are written at every start.
     #[serde(default)]
     pub startup: Vec<StartupOptions>,

@@ -1,7 +1,6 @@
 //! A bus looked at by people: what is there, in which state, what its objects are. Nothing is enabled and nothing moves.
 
 use std::path::Path;
-use std::time::{Duration, Instant};
 
 use ethercrab::error::Error;
 use ethercrab::{Command, SubDeviceGroup};
@@ -15,6 +14,7 @@ use crate::coe::Objects;
 use crate::link::Link;
 use crate::master::Master;
 use crate::options::{EMULATED, Options};
+use crate::reactions::REACTIONS;
 use crate::time;
 use crate::words::{al_code, al_state, joint_code, status};
 
@@ -23,6 +23,9 @@ const AL_STATUS: u16 = 0x0130;
 
 /// Most bytes of process data that a bus may have to be looked at.
 const MAX_BYTES: usize = 1400;
+
+/// How often a bus that is watched is told of, ns.
+const TELL_NS: u64 = 100_000_000;
 
 /// The modes of operation that 6502 has bits for, by their numbers.
 const MODES: [(u32, &str); 8] = [
@@ -47,6 +50,8 @@ pub struct Found {
     pub maps: [Vec<String>; 2],
     /// Modes of operation that it can do, in letters; empty where it is no drive.
     pub modes: Vec<&'static str>,
+    /// What a drive does by itself on stops, on faults and when the bus is lost, in words.
+    pub reactions: Vec<String>,
 }
 
 /// The state of a device.
@@ -69,6 +74,25 @@ pub struct Value {
     pub bits: u8,
 }
 
+impl Value {
+    /// The number with a sign.
+    pub fn signed(&self) -> i64 {
+        let negative = self.number >> (self.bits - 1) & 1 == 1;
+        i64::from(self.number) - if negative { 1 << self.bits } else { 0 }
+    }
+}
+
+impl std::fmt::Display for Value {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (digits, number, bits) = (usize::from(self.bits / 4), self.number, self.bits);
+        let signed = self.signed();
+        write!(
+            f,
+            "0x{number:0digits$x}, {number}, {signed} with a sign, {bits} bits"
+        )
+    }
+}
+
 /// A device of a bus in operation, as people watch it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Watched {
@@ -80,6 +104,8 @@ pub struct Watched {
     pub status: Option<String>,
     /// Why it counts as lost.
     pub lost: Option<String>,
+    /// The objects that were asked for, with their values, or why they could not be read.
+    pub objects: Vec<String>,
 }
 
 /// One end of a bus, with a master that enables nothing.
@@ -167,6 +193,7 @@ impl Survey {
                     clock: device.dc_support().enhanced(),
                     maps: [vec![], vec![]],
                     modes: vec![],
+                    reactions: vec![],
                 };
                 for (map, assignment) in one.maps.iter_mut().zip([0x1C12, 0x1C13]) {
                     // A device without a mailbox has no objects.
@@ -187,6 +214,9 @@ impl Survey {
                         .filter(|(mode, _)| modes >> (mode - 1) & 1 == 1)
                         .map(|(_, name)| *name)
                         .collect();
+                    for reaction in &REACTIONS {
+                        one.reactions.extend(reaction.told(&objects).await?);
+                    }
                 }
                 found.push(one);
             }
@@ -233,21 +263,7 @@ impl Survey {
     /// # Errors
     /// What the device refuses, in words.
     pub fn read(&mut self, place: usize, index: u16, sub: u8) -> Result<Value, String> {
-        self.with_objects(place, async |objects| {
-            let mut refused = String::new();
-            for bytes in [4, 2, 1] {
-                match objects.read(index, sub, bytes).await {
-                    Ok(number) => {
-                        return Ok(Value {
-                            number,
-                            bits: bytes as u8 * 8,
-                        });
-                    }
-                    Err(words) => refused = words,
-                }
-            }
-            Err(refused)
-        })
+        self.with_objects(place, async |objects| objects.read_any(index, sub).await)
     }
 
     /// Writes an object of the device at a place, and reads it back.
@@ -322,39 +338,80 @@ pub fn context_of(options: &Options, fine_period_s: f64, real_time: bool) -> Dri
     context
 }
 
-/// Brings a bus to OP with its drives disabled, exchanges for so long on the wall clock, and tells what it sees ten times a second.
+/// An object of the device at a place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Object {
+    /// Place of the device, from 0.
+    pub place: usize,
+    /// Index of the object.
+    pub index: u16,
+    /// Its sub-index.
+    pub sub: u8,
+}
+
+/// What [`watch`] is to look at.
+#[derive(Clone, Debug, Default)]
+pub struct Watch<'a> {
+    /// A file for every frame from power-on; what Wireshark opens.
+    pub record: Option<&'a Path>,
+    /// How long, s.
+    pub time_s: f64,
+    /// Objects that are read beside the process data, each time that something is told.
+    pub objects: &'a [Object],
+}
+
+/// Brings a bus to OP with its drives disabled, exchanges for so long, and tells what it sees ten times a second: on the wall
+/// clock, or with `interface = "emulated"` on virtual time.
 ///
 /// # Errors
 /// What cannot be brought up.
 pub fn watch(
     options: &Options,
     fine_period_s: f64,
-    record: Option<&Path>,
-    time_s: f64,
+    what: &Watch<'_>,
     mut tell: impl FnMut(&[Watched], &Counters, Option<i64>),
 ) -> Result<(), String> {
-    let context = context_of(options, fine_period_s, true);
+    let context = context_of(options, fine_period_s, options.interface != EMULATED);
     let mut bus = Bus::open(options, &context)?;
-    if let Some(path) = record {
+    if let Some(path) = what.record {
         bus.link_mut().record(path)?;
     }
-    let begun = Instant::now();
-    let mut told = Instant::now();
+    let until_ns = bus.link_mut().now_ns() + (what.time_s.max(0.0) * 1e9) as u64;
     bus.start()?;
-    while begun.elapsed().as_secs_f64() < time_s {
+    let mut tell_ns = bus.link_mut().now_ns();
+    while bus.link_mut().now_ns() < until_ns {
         bus.turn();
-        if told.elapsed() >= Duration::from_millis(100) {
-            told = Instant::now();
-            tell(&watched(&bus), &bus.counters, bus.phase_ns());
+        if bus.link_mut().now_ns() >= tell_ns {
+            tell_ns += TELL_NS;
+            tell(
+                &watched(&mut bus, what.objects),
+                &bus.counters,
+                bus.phase_ns(),
+            );
         }
     }
-    tell(&watched(&bus), &bus.counters, bus.phase_ns());
+    tell(
+        &watched(&mut bus, what.objects),
+        &bus.counters,
+        bus.phase_ns(),
+    );
     bus.stop();
     Ok(())
 }
 
-fn watched(bus: &Bus) -> Vec<Watched> {
-    let line = |seen: Seen<'_>| {
+fn watched(bus: &mut Bus, objects: &[Object]) -> Vec<Watched> {
+    let read: Vec<_> = objects
+        .iter()
+        .map(|object| {
+            let Object { place, index, sub } = *object;
+            let told = match bus.read_object(place, index, sub) {
+                Ok(value) => format!("{index:04X}:{sub:02X} = {value}"),
+                Err(words) => words,
+            };
+            (place, told)
+        })
+        .collect();
+    let line = |(place, seen): (usize, Seen<'_>)| {
         let (al, code) = (seen.al, seen.al_code);
         let error = if al & 0x10 != 0 {
             format!(", {code:04X}: {}", al_code(code))
@@ -368,7 +425,12 @@ fn watched(bus: &Bus) -> Vec<Watched> {
                 .status
                 .map(|word| format!("{word:04X} {}", status(word))),
             lost: seen.lost.map(joint_code),
+            objects: read
+                .iter()
+                .filter(|(of, _)| *of == place)
+                .map(|(_, told)| told.clone())
+                .collect(),
         }
     };
-    bus.watch().into_iter().map(line).collect()
+    bus.watch().into_iter().enumerate().map(line).collect()
 }

@@ -16,6 +16,8 @@ pub(crate) mod own {
     pub(crate) const HOMING: u32 = 0x2_0005;
     /// The host fell silent while the joint moved.
     pub(crate) const SILENT_HOST: u32 = 0x2_0006;
+    /// The clock that leads the others does not answer.
+    pub(crate) const NO_CLOCK: u32 = 0x2_0007;
     /// The drive was told to enable and does not; the low 8 bits are of its status word.
     pub(crate) const NEVER_ENABLED: u32 = 0x3_0000;
     /// Added to a code of the spindle's drive, which no joint has.
@@ -160,6 +162,9 @@ pub(crate) fn joint_code(code: u32) -> String {
         own::MODE => "it shows another mode of operation (6061) than it was asked for (6060)".to_string(),
         own::HOMING => "it says that its homing failed (6041 bit 13)".to_string(),
         own::SILENT_HOST => "it was stopped, because the computer told it nothing while it moved".to_string(),
+        own::NO_CLOCK => {
+            "the clock that leads the others (0910 of the first device that has one) does not answer any more".to_string()
+        }
         0x3_0000..=0x3_ffff => {
             format!("it was told to enable, and its status (6041) stays at \"{}\"", status((code & 0xffff) as u16))
         }

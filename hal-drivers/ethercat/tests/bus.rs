@@ -461,6 +461,114 @@ fn quick_stop_ramps_by_the_drive_and_holds_until_it_is_let_go() {
     rig.enable();
 }
 
+/// What a drive does on a quick stop is its own: over which ramp, and whether it holds behind it.
+#[test]
+fn a_quick_stop_is_the_drives_own_whatever_its_option() {
+    for (option, holds) in [(1, false), (2, false), (5, true), (6, true)] {
+        let startup = format!("startup = [{{ sdo = \"0x605a\", i16 = {option} }}]");
+        let mut rig = Rig::of(
+            &format!("{}{}", drive(0, "x", &startup), emulated("")),
+            &["x"],
+        );
+        rig.enable();
+        (0..200).for_each(|_| rig.go(0.05));
+        rig.driver.quick_stop();
+        (0..200).for_each(|_| rig.go(0.05));
+        let stands_mm = rig.place_mm();
+        let (_, _, state) = rig.drive_state();
+        assert_eq!(
+            state == DriveState::QuickStopActive,
+            holds,
+            "option {option}: {state:?}"
+        );
+        (0..50).for_each(|_| rig.go(0.05));
+        let moved_mm = rig.place_mm() - stands_mm;
+        assert!(
+            moved_mm.abs() < 3.0 / COUNTS,
+            "option {option}: it moved on by {moved_mm} mm"
+        );
+        rig.setpoint.enable = 0;
+        rig.setpoint.velocity = AxisVector::ZERO;
+        rig.until(JointState::Disabled);
+        rig.enable();
+        let jump_mm = rig.place_mm() - stands_mm;
+        assert!(
+            jump_mm.abs() < 3.0 / COUNTS,
+            "option {option}: it jumped by {jump_mm} mm"
+        );
+    }
+}
+
+/// What drives do by themselves is compared with the machine file before anything is enabled.
+#[test]
+fn what_a_drive_does_by_itself_is_compared_with_the_machine_file() {
+    let of_drive = |number: u16, index: u16| {
+        let [low, high] = number.to_le_bytes();
+        emulated(&format!(
+            "objects = [{{ index = {index}, sub = 0, value = [{low}, {high}], writable = true }}]"
+        ))
+    };
+    let start = |of_machine: &str, of_drive: &str| {
+        let (mut driver, context) =
+            Rig::open(&format!("{}{of_drive}", drive(0, "x", of_machine)), &["x"]);
+        driver.open(&context).unwrap();
+        driver
+            .start()
+            .err()
+            .map(|error| error.message().to_string())
+    };
+    for (of_machine, of_drive, words) in [
+        (
+            "",
+            of_drive(0, 0x605E),
+            "what it does on a fault (605E) is 0, no torque, so that the axis runs out; set it with startup",
+        ),
+        (
+            "",
+            of_drive(0, 0x6007),
+            "what it does when the bus is lost (6007) is 0, nothing",
+        ),
+        ("", of_drive(2, 0x6007), "(6007) is 2, no torque"),
+        (
+            "reactions = { quick_stop = 6 }",
+            emulated(""),
+            "(605A) is 2, the ramp of a quick stop (6085); the machine file wants 6",
+        ),
+        (
+            "reactions = { shutdown = 0 }",
+            emulated(""),
+            "what it does on a shutdown (605B) is 1",
+        ),
+        ("reactions = { disable = 0 }", emulated(""), "(605C) is 1"),
+        (
+            "reactions = { halt = 4 }",
+            emulated(""),
+            "(605D) is 1, its ramp (6084); the machine file wants 4",
+        ),
+    ] {
+        let refused =
+            start(of_machine, &of_drive).unwrap_or_else(|| panic!("{words}: it was let in"));
+        assert!(
+            refused.contains("device 0 (x)") && refused.contains(words),
+            "{refused}"
+        );
+    }
+    for (of_machine, of_drive) in [
+        ("reactions = { fault = 0 }", of_drive(0, 0x605E)),
+        (
+            "startup = [{ sdo = \"0x605e\", i16 = 1 }]",
+            of_drive(0, 0x605E),
+        ),
+        (
+            "reactions = { quick_stop = 6, shutdown = 1, disable = 1, halt = 1, fault = 2, bus_lost = 1 }\n\
+             startup = [{ sdo = \"0x605a\", i16 = 6 }]",
+            emulated(""),
+        ),
+    ] {
+        assert_eq!(start(of_machine, &of_drive), None, "{of_machine}");
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 6, ..ProptestConfig::default() })]
 
@@ -530,6 +638,35 @@ fn missed_sync0_and_lost_clocks_are_told() {
         rig.feedback.state[1],
         JointState::Enabled,
         "the other one goes on"
+    );
+    // One SYNC0 that a drive misses passes; several are its fault, by its own code.
+    let mut rig = Rig::of(&of(""), &["x", "y"]);
+    rig.enable();
+    rig.inject(What::MissedSync {
+        device: 0,
+        pulses: 1,
+    });
+    (0..100).for_each(|_| rig.exchange());
+    assert_eq!(rig.feedback.state[..2], [JointState::Enabled; 2]);
+    // The clock that leads is gone: nobody is steered by what it said before, and the joints do not drift on in silence.
+    rig.inject(What::LostClock { device: 0 });
+    for _ in 0..2 {
+        rig.exchange();
+        assert_eq!(rig.feedback.has_phase, 0);
+        assert_eq!(rig.feedback.state[..2], [JointState::Enabled; 2]);
+    }
+    rig.exchange();
+    assert_eq!(rig.feedback.state[0], JointState::Lost);
+    assert_eq!(
+        rig.feedback.state[1],
+        JointState::Lost,
+        "it followed that clock"
+    );
+    let why = rig.driver.explain(0, rig.feedback.fault_code[0]);
+    assert!(
+        why.as_str().contains("the clock that leads"),
+        "{}",
+        why.as_str()
     );
 }
 

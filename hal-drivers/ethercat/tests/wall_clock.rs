@@ -5,50 +5,27 @@ use std::path::Path;
 use std::process::Command;
 
 use tandem_ethercat::Survey;
+use tandem_rig::{BUS_END, MASTER_END, program_beside, with_cable};
 
 /// Set in the process that is within the namespace.
 const WITHIN: &str = "TANDEM_TEST_WITHIN_NAMESPACE";
-/// The master's end.
-const MASTER: &str = "veth-master";
 
 /// Runs this test again within a namespace with the two ends of a virtual cable, an emulator at one of them; what it printed, or
 /// why that cannot be.
-fn within_namespace(test: &str) -> Result<String, String> {
-    let binary = std::env::current_exe().unwrap();
-    // Beside the tests of this package: the workspace's programs.
-    let emulator = binary
-        .parent()
-        .and_then(Path::parent)
-        .unwrap()
-        .join("tandem-ethercat-emulator");
-    if !emulator.exists() {
-        return Err(format!("{} is not built", emulator.display()));
-    }
+fn within_namespace(test: &str, before: &str) -> Result<String, String> {
+    let emulator = program_beside("tandem-ethercat-emulator")?;
     let bus = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/buses/mill.toml");
     let script = format!(
-        "ip link add veth-bus type veth peer name {MASTER} && ip link set veth-bus up && ip link set {MASTER} up || exit 99\n\
-         {} {} --interface veth-bus --for 60 & emulator=$!; sleep 0.5\n\
+        "{} {} --interface {BUS_END} --for 60 & emulator=$!; sleep 0.5\n{before}\n\
          {WITHIN}=1 {} --exact {test} --nocapture; code=$?; kill $emulator; exit $code",
         emulator.display(),
         bus.display(),
-        binary.display()
+        std::env::current_exe().unwrap().display()
     );
-    let mut refused = String::new();
-    for namespace in [&["--net"][..], &["--user", "--map-root-user", "--net"]] {
-        let run = Command::new("unshare")
-            .args(namespace)
-            .args(["sh", "-c", &script])
-            .output();
-        let run = run.map_err(|error| format!("no unshare: {error}"))?;
-        let told = String::from_utf8_lossy(&run.stdout) + String::from_utf8_lossy(&run.stderr);
-        let cannot = run.status.code() == Some(99) || told.contains("unshare failed");
-        if !cannot {
-            assert!(run.status.success(), "{told}");
-            return Ok(told.to_string());
-        }
-        refused = told.to_string();
-    }
-    Err(format!("no network namespace: {}", refused.trim()))
+    let run = with_cable(&script)?;
+    let told = String::from_utf8_lossy(&run.stdout) + String::from_utf8_lossy(&run.stderr);
+    assert!(run.status.success(), "{told}");
+    Ok(told.to_string())
 }
 
 fn is_within() -> bool {
@@ -58,13 +35,16 @@ fn is_within() -> bool {
 #[test]
 fn a_bus_behind_a_network_interface_is_scanned_read_and_written() {
     if !is_within() {
-        match within_namespace("a_bus_behind_a_network_interface_is_scanned_read_and_written") {
+        match within_namespace(
+            "a_bus_behind_a_network_interface_is_scanned_read_and_written",
+            "",
+        ) {
             Ok(told) => assert!(told.contains("8 devices seen"), "{told}"),
             Err(why) => println!("skipped: {why}"),
         }
         return;
     }
-    let mut survey = Survey::open(MASTER, None).unwrap();
+    let mut survey = Survey::open(MASTER_END, None).unwrap();
     let found = survey.scan().unwrap();
     assert_eq!(found.len(), 8);
     assert_eq!(
@@ -79,7 +59,7 @@ fn a_bus_behind_a_network_interface_is_scanned_read_and_written() {
     survey.write(1, 0x6085, 0, value).unwrap();
     assert_eq!(survey.read(1, 0x6085, 0).unwrap(), value);
     // The interface is this process's alone.
-    let taken = Survey::open(MASTER, None).err().unwrap();
+    let taken = Survey::open(MASTER_END, None).err().unwrap();
     assert!(
         taken.contains("another process drives the interface"),
         "{taken}"
@@ -98,4 +78,47 @@ fn an_interface_that_is_not_there_is_refused_in_words() {
         known.iter().any(|words| refused.contains(words)),
         "{refused}"
     );
+}
+
+#[test]
+fn an_interface_that_is_down_is_refused_in_words() {
+    if !is_within() {
+        let down = format!("ip link set dev {MASTER_END} down");
+        match within_namespace("an_interface_that_is_down_is_refused_in_words", &down) {
+            Ok(told) => assert!(told.contains("refused"), "{told}"),
+            Err(why) => println!("skipped: {why}"),
+        }
+        return;
+    }
+    let refused = Survey::open(MASTER_END, None).err().unwrap();
+    let words =
+        format!("the network interface {MASTER_END} is down: `ip link set {MASTER_END} up`");
+    assert!(refused.contains(&words), "{refused}");
+    println!("refused");
+}
+
+/// Without the capability, in a namespace of users that gives none of the network.
+#[test]
+fn without_the_capability_for_raw_sockets_it_is_refused_in_words() {
+    const TEST: &str = "without_the_capability_for_raw_sockets_it_is_refused_in_words";
+    if is_within() {
+        let refused = Survey::open("lo", None).err().unwrap();
+        assert!(refused.contains("CAP_NET_RAW"), "{refused}");
+        println!("refused");
+        return;
+    }
+    let run = Command::new("unshare")
+        .args(["--user", "--"])
+        .arg(std::env::current_exe().unwrap())
+        .args(["--exact", TEST, "--nocapture"])
+        .env(WITHIN, "1")
+        .output();
+    let Ok(run) = run else {
+        return println!("skipped: no unshare");
+    };
+    let told = String::from_utf8_lossy(&run.stdout) + String::from_utf8_lossy(&run.stderr);
+    if told.contains("unshare failed") {
+        return println!("skipped: no user namespace to be without permission in: {told}");
+    }
+    assert!(run.status.success() && told.contains("refused"), "{told}");
 }

@@ -43,6 +43,9 @@ pub enum Bus {
         /// For so many seconds
         #[arg(long = "for", value_name = "SECONDS", default_value_t = 10.0)]
         seconds: f64,
+        /// Reads an object of a device meanwhile, as `2:0x6079` or `2:0x6099:1`; may be repeated
+        #[arg(long = "object", value_name = "DEVICE:OBJECT")]
+        objects: Vec<String>,
     },
     /// The same, and write every frame from power-on into a file that Wireshark opens
     Pcap {
