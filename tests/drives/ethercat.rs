@@ -189,6 +189,18 @@ fn whatever_goes_wrong_in_any_frame_is_named_and_the_joints_come_to_rest() {
             ),
             (
                 "",
+                "kind = \"cut\", behind = 0",
+                "device 1: the working counter says",
+            ),
+            ("", "kind = \"cut\"", "no frame comes back"),
+            // Plugged in again, too late.
+            (
+                "cycles = 20",
+                "kind = \"cut\", behind = 1",
+                "device 2: the working counter says",
+            ),
+            (
+                "",
                 "kind = \"deaf\", device = 1",
                 "device 1: the working counter says",
             ),
@@ -206,6 +218,16 @@ fn whatever_goes_wrong_in_any_frame_is_named_and_the_joints_come_to_rest() {
                 "",
                 "kind = \"al-error\", device = 0, state = \"safe-op\", code = 0x2c",
                 "device 0: it left OP: 002C, fatal",
+            ),
+            (
+                "",
+                "kind = \"al-error\", device = 2, state = \"safe-op\", code = 0x1b",
+                "device 2: it left OP: 001B, sync manager watchdog",
+            ),
+            (
+                "",
+                "kind = \"al-error\", device = 1, state = \"pre-op\", code = 0x32",
+                "device 1: it left OP: 0032, the device's clock does not follow",
             ),
             (
                 "",
@@ -264,6 +286,8 @@ fn what_passes_within_patience_changes_no_command() {
             ("cycles = 1", "kind = \"foreign\"", 0),
             ("cycles = 1", "kind = \"stray\"", 0),
             ("cycles = 2", "kind = \"deaf\", device = 1", 2),
+            ("cycles = 2", "kind = \"cut\"", 2),
+            ("cycles = 1", "kind = \"cut\", behind = 0", 1),
         ] {
             for n in first..first + count - 6 {
                 let case = format!(

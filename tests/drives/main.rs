@@ -2,6 +2,7 @@
 //!
 //! `TANDEM_SEEDS=n` asks for more random faults than usual.
 
+mod cable;
 #[path = "../counting_allocator.rs"]
 mod counting_allocator;
 mod double;
@@ -12,6 +13,7 @@ mod measures;
 mod real;
 mod several;
 mod slow;
+mod tower;
 
 use tandem_gcode::Program;
 use tandem_host::{Registry, RunObserver};
