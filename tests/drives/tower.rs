@@ -182,3 +182,79 @@ fn the_cutting_torque_is_held_by_what_the_drives_tell() {
         "behind the specimen it goes as fast as in air: {air}"
     );
 }
+
+/// Lost frames and the phase are in the trace, in the summary and in the report of a run.
+#[test]
+fn lost_frames_and_the_phase_are_in_what_a_run_leaves() {
+    let folder = tempfile::tempdir().unwrap();
+    let machine = folder.path().join("machine.toml");
+    let text = std::fs::read_to_string(examples().join("machines/ethercat.toml")).unwrap();
+    let text = text.replacen(
+        "max_lost_frames = 2\n",
+        "max_lost_frames = 2\nsync = \"dc\"\n",
+        1,
+    );
+    let lost = "[[drivers.bus.options.emulated.faults]]\nat = { cycle = 1200 }\nlasts = { cycles = 2 }\n\
+                what = { kind = \"lost-reply\" }\n";
+    std::fs::write(&machine, text + lost).unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let output = Command::new(env!("CARGO_BIN_EXE_tandem"))
+        .arg("run")
+        .arg(examples().join("programs/square.ngc"))
+        .args(["--set", "machine.require_homing=false", "--machine"])
+        .arg(&machine)
+        .arg("--trace")
+        .arg(path("trace.ttr"))
+        .arg("--summary")
+        .arg(path("summary.json"))
+        .arg("--report")
+        .arg(path("report.html"))
+        .output()
+        .unwrap();
+    let told = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{told}");
+    let words = "what the drives tell was old in 2 samples, by 2 periods at most: frames were lost, or late";
+    assert!(told.contains(words), "{told}");
+    let export = Command::new(env!("CARGO_BIN_EXE_tandem"))
+        .args(["trace", "export"])
+        .arg(path("trace.ttr"))
+        .arg("--csv")
+        .arg(path("trace.csv"))
+        .status();
+    assert!(export.unwrap().success());
+    let mut rows = csv::Reader::from_path(path("trace.csv")).unwrap();
+    let head = rows.headers().unwrap().clone();
+    let place = |name: &str| head.iter().position(|column| column == name).unwrap();
+    let (age, phase, t_s) = (place("fb_age_periods"), place("phase_ns"), place("t_s"));
+    let rows: Vec<_> = rows.records().map(Result::unwrap).collect();
+    let ages: Vec<&str> = rows
+        .iter()
+        .map(|row| &row[age])
+        .filter(|age| *age != "0")
+        .collect();
+    assert_eq!(ages, ["1", "2"]);
+    for row in &rows {
+        // Nothing is known of the phase of a frame that did not come back.
+        assert_eq!(&row[phase] == "nan", &row[age] != "0", "{}", &row[t_s]);
+    }
+    let summary = std::fs::read_to_string(path("summary.json")).unwrap();
+    let summary: Value = serde_json::from_str(&summary).unwrap();
+    assert_eq!(
+        (
+            &summary["old_feedback_samples"],
+            &summary["max_feedback_age_periods"]
+        ),
+        (&2.into(), &2.into())
+    );
+    let phase_us = summary["max_phase_us"].as_f64().unwrap();
+    assert!((0.0..20.0).contains(&phase_us), "{phase_us}");
+    let report = std::fs::read_to_string(path("report.html")).unwrap();
+    for shown in [
+        "age of feedback",
+        "phase of the exchange",
+        "largest phase of an exchange",
+        words,
+    ] {
+        assert!(report.contains(shown), "the report has no {shown}");
+    }
+}

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use tandem_machine::{JerkMode, Machine};
-use tandem_recorder::{Output, PlanningRow, RecordError, Summary};
+use tandem_recorder::{Output, PlanningRow, RecordError, Summary, age};
 use tandem_report::{Axis, Ended, Report, Samples, Signal, Unit};
 use tandem_rings::Sample;
 use tandem_sdk::{Axes, AxisVector, Block, BlockReport, Curve};
@@ -17,6 +17,9 @@ pub struct Collector {
     report: Report,
     axes: Axes,
     deviation_mm: Vec<f64>,
+    /// How old feedback was, periods, and how far the exchange was from where the bus wants it, µs.
+    feedback_age: Vec<f64>,
+    phase_us: Vec<f64>,
     corners: Corners,
     curves: Curves,
     tolerances: Tolerances,
@@ -51,6 +54,8 @@ impl Collector {
             report,
             axes: machine.axes,
             deviation_mm: vec![],
+            feedback_age: vec![],
+            phase_us: vec![],
             corners: Corners::default(),
             curves: Curves::new(machine),
             tolerances,
@@ -82,6 +87,9 @@ impl Collector {
                 f64::NAN
             });
         self.deviation_mm.push(deviation_mm);
+        self.feedback_age.push(f64::from(age(sample)));
+        let phase_us = sample.phase_ns.map_or(f64::NAN, |ns| ns as f64 / 1e3);
+        self.phase_us.push(phase_us);
         self.corners.sample(sample);
         self.curves.sample(sample);
         self.tolerances.sample(sample);
@@ -102,6 +110,27 @@ impl Collector {
         let fault = summary.fault.clone().map(Ended::Fault);
         self.report.ended = fault.or_else(|| summary.stopped.clone().map(Ended::Stopped));
         self.report.signals.extend(self.corners.signals());
+        // Of a bus; a driver without one has neither.
+        for (name, unit, values, is_told) in [
+            (
+                "age of feedback",
+                "periods",
+                self.feedback_age,
+                summary.old_feedback_samples > 0,
+            ),
+            (
+                "phase of the exchange",
+                "µs",
+                self.phase_us,
+                summary.max_phase_us.is_some(),
+            ),
+        ] {
+            self.report.signals.extend(is_told.then(|| Signal {
+                name: name.to_string(),
+                unit: unit.to_string(),
+                values,
+            }));
+        }
         let (curves, chord_share) = self.curves.signals();
         self.report.signals.extend(curves);
         self.report.samples.chord_share = chord_share;
@@ -197,6 +226,11 @@ fn facts(summary: &Summary) -> Vec<(String, String)> {
             format!("{}, {}", summary.governed_samples, summary.starvations),
         ),
     ];
+    facts.extend(
+        summary
+            .max_phase_us
+            .map(|us| fact("largest phase of an exchange", format!("{us:.1} µs"))),
+    );
     facts.extend(summary.timing().map(|timing| fact("fine loop", timing)));
     facts.extend(
         summary

@@ -23,7 +23,7 @@ pub use lateness::{Lateness, Row};
 pub use monitor::Monitor;
 pub use policy_summary::PolicySummary;
 pub use record::{
-    BlocksCsv, EventsCsv, Output, RecordError, SWITCHED_COLUMNS, TraceCsv, flush_outputs,
+    BlocksCsv, EventsCsv, Output, RecordError, SWITCHED_COLUMNS, TraceCsv, age, flush_outputs,
     outputs_word, rpm,
 };
 pub use stops::{Stop, StopWatch};

@@ -7,6 +7,7 @@ use tandem_sdk::{Axes, AxisVector, Block, BlockKind, BlockReport, Curve};
 use crate::block_times::{BlockTimes, TimeGoesTo};
 use crate::joint_peaks::{JointWatch, raise};
 use crate::path_watch::PathWatch;
+use crate::record::age;
 use crate::stops::StopWatch;
 use crate::worst::Worst;
 
@@ -37,6 +38,12 @@ pub struct Monitor {
     pub stops: StopWatch,
     watch: PathWatch,
     axes: Axes,
+    /// Samples whose feedback was old, and by how many periods at most.
+    pub old_feedback_samples: u64,
+    /// The greatest age, periods.
+    pub max_feedback_age_periods: u32,
+    /// How far an exchange was from where the bus wants it at most, ns; none where no driver tells.
+    pub max_phase_ns: Option<u64>,
     /// What the joints do, where they are not the axes.
     pub joints: Option<JointWatch>,
 }
@@ -70,6 +77,9 @@ impl Monitor {
                 &machine.start,
             ),
             axes: machine.axes,
+            old_feedback_samples: 0,
+            max_feedback_age_periods: 0,
+            max_phase_ns: None,
             joints: None,
         }
     }
@@ -114,6 +124,11 @@ impl Monitor {
             self.last = [sample.command, AxisVector::ZERO, AxisVector::ZERO];
         }
         self.stops.sample(sample);
+        let age_periods = age(sample);
+        self.old_feedback_samples += u64::from(age_periods > 0);
+        self.max_feedback_age_periods = self.max_feedback_age_periods.max(age_periods);
+        let phase_ns = sample.phase_ns.map(i64::unsigned_abs);
+        self.max_phase_ns = self.max_phase_ns.max(phase_ns);
         let by = &mut self.limited_by_s;
         // A handful of reasons: looking through them is the quickest, and this is done for every block.
         let part = |goes_to, time_s| match by.iter_mut().find(|(by, _)| *by == goes_to) {

@@ -89,6 +89,13 @@ pub struct Summary {
     pub lateness_us: Option<LatenessUs>,
     /// How long the driver's exchange took; absent on the virtual clock.
     pub exchange_us: Option<ExchangeUs>,
+    /// Samples in which what some drive told was old: a frame was lost, or late.
+    pub old_feedback_samples: u64,
+    /// The greatest age, periods.
+    pub max_feedback_age_periods: u32,
+    /// How far an exchange was from where the clock of its bus wants it at most, µs; absent where no driver tells.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_phase_us: Option<f64>,
     /// Page faults of the fine thread; absent on the virtual clock.
     pub page_faults: Option<PageFaults>,
     /// How often the queue ran low.
@@ -139,8 +146,20 @@ impl Summary {
 
     /// What is to be known of a run that came to its end all the same, in words.
     pub fn warnings(&self) -> Vec<String> {
+        let mut warnings = vec![];
+        let Self {
+            old_feedback_samples,
+            max_feedback_age_periods,
+            ..
+        } = self;
+        if *old_feedback_samples > 0 {
+            warnings.push(format!(
+                "what the drives tell was old in {old_feedback_samples} samples, by {max_feedback_age_periods} periods at most: \
+                 frames were lost, or late"
+            ));
+        }
         if self.missed_periods == 0 && self.overruns == 0 {
-            return vec![];
+            return warnings;
         }
         let Self {
             missed_periods,
@@ -162,7 +181,8 @@ impl Summary {
             "{missed_periods} fine periods went by without a sample, {missed_in_motion} of them in motion, \
              beside {samples} with one"
         );
-        vec![beside + &over + &cause]
+        warnings.push(beside + &over + &cause);
+        warnings
     }
 
     /// What made the fine loop late by a period or more, in words, where that is known.

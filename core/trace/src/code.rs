@@ -94,6 +94,7 @@ mod tests {
         axes: 8,
         signals: 8,
         switched: true,
+        aged: true,
     };
 
     #[test]
@@ -133,6 +134,7 @@ mod tests {
             axes: 1,
             signals: 0,
             switched: false,
+            aged: false,
         };
         let decoded = |bytes: &[u8]| History::EMPTY.decode(bytes, shape);
         assert!(decoded(&[0; 5]).is_some() && decoded(&[1, 0, 0, 0, 0, 7]).is_some());

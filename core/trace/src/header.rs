@@ -10,8 +10,9 @@ use crate::words::Shape;
 
 /// The first bytes of a trace: not text, and spoilt by whatever rewrites line ends.
 pub const MAGIC: [u8; 8] = *b"\x89TTR\r\n\x1a\n";
-/// The format that is written. Format 1, without commands and dry runs, and format 2, without what is switched, are read too.
-pub const FORMAT: u32 = 3;
+/// The format that is written. Format 1, without commands and dry runs, format 2, without what is switched, and format 3,
+/// without the age of feedback, are read too.
+pub const FORMAT: u32 = 4;
 /// Bytes before the body: magic, format, length of the body.
 const FIXED_BYTES: usize = MAGIC.len() + 4 + 4;
 /// Most bytes of the body, so that a damaged length asks for no memory.
@@ -41,6 +42,11 @@ pub fn has_switched(format: u32) -> bool {
     format > 2
 }
 
+/// Whether the samples of a trace of this format say how old their feedback was.
+pub fn has_age(format: u32) -> bool {
+    format > 3
+}
+
 impl Header {
     /// Of the samples of this `format`.
     pub(crate) fn shape(&self, format: u32) -> Shape {
@@ -48,6 +54,7 @@ impl Header {
             axes: self.axes.count(),
             signals: self.signals.len(),
             switched: has_switched(format),
+            aged: has_age(format),
         }
     }
 

@@ -18,6 +18,6 @@ mod words;
 mod writer;
 
 pub use error::{Cause, TraceError};
-pub use header::{FORMAT, Header, MAGIC, has_switched};
+pub use header::{FORMAT, Header, MAGIC, has_age, has_switched};
 pub use reader::{Damage, Ending, Item, Reader, Record};
 pub use writer::{KEY_INTERVAL, Writer};

@@ -3,11 +3,14 @@
 use tandem_rings::{MachineState, Sample, Switched};
 use tandem_sdk::{AxisVector, MAX_AXES, MAX_SIGNALS};
 
-/// Tick, block, line, state; two positions; feed, sigma, ratio; what is switched, and the phase; signals.
+/// Tick, block, line, state with the age of feedback; two positions; feed, sigma, ratio; what is switched, and the phase; signals.
 pub const MAX_WORDS: usize = 4 + 2 * MAX_AXES + 3 + SWITCHED_WORDS + MAX_SIGNALS;
 
 /// Outputs, spindle, phase.
 const SWITCHED_WORDS: usize = 3;
+
+/// Above so many bits of the state's word stands the age of feedback, in periods.
+const AGE_BITS: u32 = 32;
 
 /// The word of a phase that nobody tells: no phase is so long.
 const NO_PHASE: u64 = i64::MIN.cast_unsigned();
@@ -22,6 +25,8 @@ pub struct Shape {
     pub signals: usize,
     /// From format 3 on.
     pub switched: bool,
+    /// Whether the word of the state says how old the oldest feedback was. From format 4 on.
+    pub aged: bool,
 }
 
 impl Shape {
@@ -38,11 +43,13 @@ impl Shape {
 
     /// The words of a sample.
     pub fn to_words(self, sample: &Sample, signals: &[f64]) -> Words {
+        let ages = sample.age_periods[..self.axes].iter();
+        let age = u64::from(ages.max().copied().unwrap_or(0)) * u64::from(self.aged);
         let numbers = [
             sample.tick,
             sample.block,
             u64::from(sample.line),
-            sample.state as u64,
+            sample.state as u64 | age << AGE_BITS,
         ];
         let positions = sample.command.0[..self.axes]
             .iter()
@@ -68,7 +75,11 @@ impl Shape {
 
     /// The sample and the signals of a row of words; `None` where they are those of no sample.
     pub fn to_sample(self, words: &Words) -> Option<(Sample, [f64; MAX_SIGNALS])> {
-        let state = u32::try_from(words[3]).ok()?;
+        let age = (words[3] >> AGE_BITS) as u32;
+        if age > 0 && !self.aged {
+            return None;
+        }
+        let state = words[3] as u32;
         let mut words_left = words[4..].iter().copied();
         let mut take = |count: usize| {
             let mut values = [0; MAX_AXES];
@@ -103,6 +114,7 @@ impl Shape {
                 spindle_rad_per_s: f64::from_bits(spindle),
                 ..Switched::default()
             },
+            age_periods: std::array::from_fn(|axis| if axis < self.axes { age } else { 0 }),
             phase_ns: (phase != NO_PHASE).then_some(phase.cast_signed()),
             ..Sample::default()
         };

@@ -47,8 +47,8 @@ impl<W: Write> Writer<W> {
 
     /// Adds a sample and the strategy's signals, as many as the header names.
     ///
-    /// Tick, block, line, state, command, feedback, feed, sigma, ratio, what is switched and the phase are kept; the other
-    /// fields are not.
+    /// Tick, block, line, state, command, feedback, its greatest age, feed, sigma, ratio, what is switched and the phase are
+    /// kept; the other fields are not.
     ///
     /// # Errors
     /// `out` refuses; another number of signals.

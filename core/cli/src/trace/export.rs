@@ -5,9 +5,9 @@ use std::io::Write;
 use std::path::Path;
 
 use tandem_recorder::{Output, TraceCsv};
-use tandem_trace::has_switched;
 
 use super::binary::Binary;
+use super::samples::switched_columns;
 
 /// Writes a binary trace as the CSV that the run would have written, and the operator's commands as a command file.
 /// Status 1 where not every record could be read; what could is written all the same.
@@ -26,7 +26,7 @@ pub fn export(trace: &Path, csv: &Path, commands: Option<&Path>) -> Result<u8, B
         header.axes,
         header.fine_period_s,
         &signals,
-        has_switched(trace.format()),
+        switched_columns(trace.format()),
     )?;
     let count = signals.len();
     while let Some(record) = trace.next()? {

@@ -5,8 +5,8 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use tandem_recorder::{SWITCHED_COLUMNS, TraceCsv, outputs_word, rpm};
-use tandem_trace::{MAGIC, Record, has_switched};
+use tandem_recorder::{SWITCHED_COLUMNS, TraceCsv, age, outputs_word, rpm};
+use tandem_trace::{MAGIC, Record, has_age, has_switched};
 
 use super::binary::Binary;
 use super::sink::is_binary_name;
@@ -92,9 +92,13 @@ impl Samples {
                     names.extend((0..axes.count()).map(name));
                 }
                 names.extend(["feed_mm_s", "sigma", "state", "ratio"].map(String::from));
-                if has_switched(binary.format()) {
-                    names.extend(SWITCHED_COLUMNS.map(String::from));
-                }
+                let switched = switched_columns(binary.format());
+                names.extend(
+                    SWITCHED_COLUMNS[..switched]
+                        .iter()
+                        .copied()
+                        .map(String::from),
+                );
                 names.extend(header.signals.iter().map(|signal| format!("sig_{signal}")));
                 names
             }
@@ -118,6 +122,15 @@ impl Samples {
             Self::Binary(binary) => binary.conclude(),
             Self::Csv(_) => 0,
         }
+    }
+}
+
+/// How many of [`SWITCHED_COLUMNS`] a trace of this format has.
+pub fn switched_columns(format: u32) -> usize {
+    match (has_switched(format), has_age(format)) {
+        (false, _) => 0,
+        (true, false) => SWITCHED_COLUMNS.len() - 1,
+        (true, true) => SWITCHED_COLUMNS.len(),
     }
 }
 
@@ -155,6 +168,9 @@ fn row(binary: &Binary, record: &Record, shown: bool) -> Row {
         cells.push(Cell::Number(
             sample.phase_ns.map_or(f64::NAN, |ns| ns as f64),
         ));
+    }
+    if has_age(binary.format()) {
+        cells.push(Cell::Number(f64::from(age(sample))));
     }
     cells.extend(
         record.signals[..header.signals.len()]

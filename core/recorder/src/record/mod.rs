@@ -8,4 +8,4 @@ mod trace_csv;
 pub use blocks_csv::BlocksCsv;
 pub use events_csv::EventsCsv;
 pub use output::{Output, RecordError, flush_outputs};
-pub use trace_csv::{SWITCHED_COLUMNS, TraceCsv, outputs_word, rpm};
+pub use trace_csv::{SWITCHED_COLUMNS, TraceCsv, age, outputs_word, rpm};

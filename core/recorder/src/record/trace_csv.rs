@@ -15,8 +15,8 @@ pub struct TraceCsv {
     out: Output,
     axes: Axes,
     period_s: f64,
-    /// What is switched, and the phase, have columns.
-    switched: bool,
+    /// How many of [`SWITCHED_COLUMNS`] there are.
+    switched: usize,
     /// It has been told that no further row can be written.
     failed: bool,
 }
@@ -27,11 +27,12 @@ impl TraceCsv {
     /// # Errors
     /// The path with the system's words.
     pub fn create(path: &Path, machine: &Machine, signals: &[&str]) -> Result<Self, String> {
-        Self::of_axes(path, machine.axes, machine.fine_period_s, signals, true)
+        let switched = SWITCHED_COLUMNS.len();
+        Self::of_axes(path, machine.axes, machine.fine_period_s, signals, switched)
     }
 
-    /// Starts the file with its head line, for a machine of which only axes and fine period are known. `switched` is whether
-    /// what is switched, and the phase, are known.
+    /// Starts the file with its head line, for a machine of which only axes and fine period are known. `switched` is how many
+    /// of the first [`SWITCHED_COLUMNS`] are known: none, what is switched and the phase, or the age of feedback too.
     ///
     /// # Errors
     /// The path with the system's words.
@@ -40,7 +41,7 @@ impl TraceCsv {
         axes: Axes,
         fine_period_s: f64,
         signals: &[&str],
-        switched: bool,
+        switched: usize,
     ) -> Result<Self, String> {
         let mut out = Output::create(path)?;
         let head = head(&axes, signals, switched);
@@ -116,7 +117,7 @@ impl TraceCsv {
             sample.state.name(),
             number(sample.ratio)
         )?;
-        if self.switched {
+        if self.switched > 0 {
             self.switched(sample)?;
         }
         for signal in signals {
@@ -137,7 +138,11 @@ impl TraceCsv {
         match sample.phase_ns {
             Some(ns) => write!(self.out, ",{ns}"),
             None => write!(self.out, ",nan"),
+        }?;
+        if self.switched == SWITCHED_COLUMNS.len() {
+            write!(self.out, ",{}", age(sample))?;
         }
+        Ok(())
     }
 }
 
@@ -151,10 +156,21 @@ pub fn outputs_word(switched: &Switched) -> String {
     format!("{:#x}", switched.user_outputs())
 }
 
-/// Names of the columns of what is switched, and of the phase.
-pub const SWITCHED_COLUMNS: [&str; 4] = ["spindle_set_rpm", "coolant", "outputs", "phase_ns"];
+/// How old the oldest feedback of an axis was, periods.
+pub fn age(sample: &Sample) -> u32 {
+    sample.age_periods.iter().copied().max().unwrap_or(0)
+}
 
-fn head(axes: &Axes, signals: &[&str], switched: bool) -> String {
+/// Names of the columns of what is switched, of the phase, and of the age of feedback.
+pub const SWITCHED_COLUMNS: [&str; 5] = [
+    "spindle_set_rpm",
+    "coolant",
+    "outputs",
+    "phase_ns",
+    "fb_age_periods",
+];
+
+fn head(axes: &Axes, signals: &[&str], switched: usize) -> String {
     let mut head = vec!["t_s".to_string(), "line".to_string()];
     for kind in ["cmd", "fb"] {
         for axis in 0..axes.count() {
@@ -169,7 +185,7 @@ fn head(axes: &Axes, signals: &[&str], switched: bool) -> String {
     head.extend(
         SWITCHED_COLUMNS
             .iter()
-            .filter(|_| switched)
+            .take(switched)
             .map(ToString::to_string),
     );
     head.extend(signals.iter().map(|signal| format!("sig_{signal}")));

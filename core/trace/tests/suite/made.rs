@@ -64,7 +64,8 @@ pub fn bits((s, signals): &Row) -> Vec<u64> {
     let switched = [s.switched.outputs, s.switched.spindle_rad_per_s.to_bits()]
         .into_iter()
         .chain(phase);
-    [s.tick, s.block, u64::from(s.line), s.state as u64]
+    let age = u64::from(*s.age_periods.iter().max().unwrap_or(&0));
+    [s.tick, s.block, u64::from(s.line), s.state as u64, age]
         .into_iter()
         .chain(switched)
         .chain(bits)
@@ -83,31 +84,35 @@ pub fn any_rows(axes: usize, signals: usize, most: usize) -> impl Strategy<Value
         floats,
         any::<u64>(),
         phase,
+        any::<u32>(),
     )
-        .prop_map(move |(tick, block, line, state, f, outputs, phase_ns)| {
-            let some = |from: usize, count: usize| {
-                std::array::from_fn(|i| if i < count { f[from + i] } else { 0.0 })
-            };
-            let sample = Sample {
-                tick,
-                block,
-                line,
-                state: MachineState::from_number(state),
-                command: AxisVector(some(0, axes)),
-                feedback: AxisVector(some(8, axes)),
-                feed_mm_per_s: f[16],
-                sigma: f[17],
-                ratio: f[18],
-                switched: Switched {
-                    outputs,
-                    spindle_rad_per_s: f[27],
-                    ..Switched::default()
-                },
-                phase_ns,
-                ..Sample::default()
-            };
-            (sample, some(19, signals))
-        });
+        .prop_map(
+            move |(tick, block, line, state, f, outputs, phase_ns, age)| {
+                let some = |from: usize, count: usize| {
+                    std::array::from_fn(|i| if i < count { f[from + i] } else { 0.0 })
+                };
+                let sample = Sample {
+                    tick,
+                    block,
+                    line,
+                    state: MachineState::from_number(state),
+                    command: AxisVector(some(0, axes)),
+                    feedback: AxisVector(some(8, axes)),
+                    feed_mm_per_s: f[16],
+                    sigma: f[17],
+                    ratio: f[18],
+                    switched: Switched {
+                        outputs,
+                        spindle_rad_per_s: f[27],
+                        ..Switched::default()
+                    },
+                    phase_ns,
+                    age_periods: std::array::from_fn(|axis| if axis < axes { age } else { 0 }),
+                    ..Sample::default()
+                };
+                (sample, some(19, signals))
+            },
+        );
     prop::collection::vec(row, 0..most)
 }
 
