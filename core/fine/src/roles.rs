@@ -146,4 +146,65 @@ mod tests {
         feedback.input_age_periods[5] = u16::MAX;
         assert_eq!(roles.judge(&feedback).all >> 5 & 1, 0, "it has no role");
     }
+
+    /// Any role alone, several on one input, a level that trips beside an age that does: whatever there is is judged, and nothing else.
+    #[test]
+    fn every_role_is_judged_and_an_input_may_have_several() {
+        let fields: [fn(&mut Roles) -> &mut u64; 6] = [
+            |roles| &mut roles.emergency_stop,
+            |roles| &mut roles.drives_ready,
+            |roles| &mut roles.door,
+            |roles| &mut roles.feed_hold,
+            |roles| &mut roles.limit,
+            |roles| &mut roles.awaited,
+        ];
+        assert!(!Roles::default().any());
+        for (number, field) in fields.iter().enumerate() {
+            for other in fields {
+                let input = 7 * number as u32;
+                let mut roles = Roles::default();
+                *field(&mut roles) |= 1 << input;
+                *other(&mut roles) |= 1 << input;
+                assert!(roles.any());
+                for closed in [false, true] {
+                    roles.normally_closed = if closed { 1 << input } else { 0 };
+                    for (tripped, age) in [(false, 0), (true, 0), (false, 1), (true, 1)] {
+                        let mut feedback = Feedback {
+                            inputs: if tripped == closed { 0 } else { u64::MAX },
+                            ..Feedback::default()
+                        };
+                        feedback.input_age_periods[input as usize] = age;
+                        let old = u64::from(age) << input;
+                        let all = u64::from(tripped || age > 0) << input;
+                        let judged = roles.judge(&feedback);
+                        assert_eq!(
+                            judged,
+                            Tripped { all, old },
+                            "{number} {closed} {tripped} {age}"
+                        );
+                        let first = (all != 0).then_some((input, age > 0));
+                        assert_eq!(judged.first(u64::MAX), first);
+                        assert_eq!(judged.first(!(1 << input)), None);
+                    }
+                }
+            }
+        }
+    }
+
+    /// An old input beside one that has the level: each is told as what it is.
+    #[test]
+    fn the_age_of_one_input_is_not_that_of_another() {
+        let roles = Roles {
+            door: 1 << 2 | 1 << 5,
+            ..Roles::default()
+        };
+        let mut feedback = Feedback {
+            inputs: 1 << 2,
+            ..Feedback::default()
+        };
+        feedback.input_age_periods[5] = 1;
+        let tripped = roles.judge(&feedback);
+        assert_eq!(tripped.first(1 << 2 | 1 << 5), Some((2, false)));
+        assert_eq!(tripped.first(1 << 5), Some((5, true)));
+    }
 }

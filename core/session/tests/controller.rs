@@ -151,6 +151,42 @@ impl Keeper for Kept {
 
 const PART: &str = "G21 G90 G54 F1200\n#100 = 1\nM3 S1000\nG1 X40\nG91 #100 = 2\nG1 Y30\nG10 L2 P2 X77\nG1 X-40\nG1 Y-30\nM2\n";
 
+/// A drive stays in its fault until somebody says "reset", which reaches it: to ask for the drives alone enables nothing.
+#[test]
+fn a_drive_that_faults_is_reset_by_its_word_and_by_no_other() {
+    for (joint, name, tick) in [(0, "X", 700), (1, "Y", 931), (2, "Z", 1203)] {
+        let faults = format!("[{{joint={joint},tick={tick},code=29200,text=\"brake chopper\"}}]");
+        let set = ("driver.options.faults".to_string(), faults);
+        let machine = Machine::read(&examples().join("mill-3axis.toml"), &[set]).unwrap();
+        let mut says = Says::new();
+        let line = says.ask(100, "mdi", json!({ "line": "G90 G1 X90 Y60 Z-30 F1500" }));
+        let faulted = says.ask(3000, "status", json!({}));
+        let enable = says.ask(10, "enable", json!({}));
+        let refused = says.ask(1000, "mdi", json!({ "line": "G90 G0 X1" }));
+        let reset = says.ask(10, "reset", json!({}));
+        let back = says.ask(3000, "mdi", json!({ "line": "G90 G0 X10 Y5 Z-1" }));
+        let done = says.ask(8000, "status", json!({}));
+        let disable = says.ask(10, "disable", json!({}));
+        says.ask(1000, "status", json!({}));
+        let told = Told::by(&machine, says, |_| (), Box::new(NoKeeper));
+        for id in [line, reset, back, disable] {
+            told.ok(id);
+        }
+        let fault = told.ok(faulted)["fault"].to_string();
+        assert!(fault.contains("brake chopper") && fault.contains(name), "{fault}");
+        for id in [enable, refused] {
+            let why = told.why(id);
+            assert!(why.contains("reset"), "{name}: {why}");
+        }
+        let done = told.ok(done);
+        assert_eq!(done["state"], "ready", "{done}");
+        for (axis, expected) in [("x_mm", 10.0), ("y_mm", 5.0), ("z_mm", -1.0)] {
+            let at = done["position"][axis].as_f64().unwrap();
+            assert!((at - expected).abs() < 1e-9, "{axis}: {at}");
+        }
+    }
+}
+
 #[test]
 fn a_day_at_the_machine_in_one_process() {
     let (machine, kept) = (machine("mill-homing.toml"), Kept::default());
