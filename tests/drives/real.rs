@@ -318,6 +318,13 @@ fn a_gantry_that_is_too_skew_is_refused_with_both_positions() {
     let words = "axes.x.max_skew_mm: the gantry is skew: x1 stands at 10.0000 mm, x2 stands at 11.5000 mm; at most 1 mm";
     assert!(refused.contains(words), "{refused}");
     assert_eq!(log("skew").stopped, 1, "what was started is let go of");
+    // What is allowed is not too much, whichever joint is ahead.
+    for x2 in [11.0, 9.0] {
+        assert_eq!(at("at-most", x2).err().map(|error| error.to_string()), None);
+    }
+    let behind = at("behind", 8.5).err().unwrap().to_string();
+    let words = "x2 stands at 8.5000 mm, x1 stands at 10.0000 mm; at most 1 mm";
+    assert!(behind.contains(words), "{behind}");
     assert_eq!(
         at("little", 10.5)
             .unwrap()
