@@ -149,6 +149,22 @@ pub struct Policy {
 }
 
 impl Policy {
+    /// Its parameters that are numbers, or true and false as 1 and 0.
+    pub fn numbers(&self) -> impl Iterator<Item = (String, f64)> {
+        let number = |value: &toml::Value| match value {
+            toml::Value::Boolean(truth) => Some(f64::from(u8::from(*truth))),
+            toml::Value::Integer(number) => Some(*number as f64),
+            other => other.as_float(),
+        };
+        let stated = self.parameters.iter();
+        stated.filter_map(move |(name, value)| Some((name.clone(), number(value)?)))
+    }
+
+    /// States the parameter `name` anew.
+    pub fn set_number(&mut self, name: &str, value: f64) {
+        self.parameters.insert(name.to_string(), value.into());
+    }
+
     /// Reads `[policy]`; `None` where it is wrong, which is reported.
     pub(crate) fn read(policy: &Section<'_>) -> Option<Self> {
         let script = policy.required("script", Section::text)?.into();

@@ -11,6 +11,7 @@ mod lateness;
 mod monitor;
 mod path_watch;
 mod policy_summary;
+mod polyline;
 mod record;
 mod stops;
 mod summary;
@@ -22,6 +23,7 @@ pub use joint_peaks::{JointPeaks, JointWatch, WatchedJoint};
 pub use lateness::{Lateness, Row};
 pub use monitor::Monitor;
 pub use policy_summary::PolicySummary;
+pub use polyline::polyline;
 pub use record::{
     BlocksCsv, EventsCsv, Output, RecordError, SWITCHED_COLUMNS, TraceCsv, age, flush_outputs,
     outputs_word, rpm,

@@ -2,6 +2,7 @@
 
 mod engine;
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 use std::thread;
@@ -13,7 +14,7 @@ use tandem_machine::Machine;
 use tandem_recorder::Summary;
 use tandem_rings::{Controls, Rest, Status};
 use tandem_rough::Source;
-use tandem_sdk::{Attached, AxisVector};
+use tandem_sdk::{Attached, AxisVector, Block, Curve};
 
 use crate::clock::exchange_time::{self, ExchangeTimes};
 use crate::drives::Roster;
@@ -21,6 +22,7 @@ use crate::error::HostError;
 use crate::plugins::hang::HangWatch;
 use crate::plugins::plugin_log::drain_plugin_log;
 use crate::plugins::registry::Registry;
+use crate::policy::PolicyHost;
 use crate::run::job::{Conclusion, Job, Made};
 use crate::run::{begin, periods};
 use crate::setup::commands::with_user_commands;
@@ -237,7 +239,32 @@ impl<'r> Resident<'r> {
         self.uptime_periods = uptime_periods;
     }
 
-    /// Checks a program from where the machine stands, with what has lasted, and makes the job that drives it. Allocates.
+    /// The parameters of the policy script, as the next job has them; none without a script.
+    pub fn policy_parameters(&self) -> BTreeMap<String, f64> {
+        let policy = self.machine.policy.as_ref();
+        let stated = policy.map(|policy| policy.numbers());
+        stated.into_iter().flatten().collect()
+    }
+
+    /// The next job has `value` for the parameter `name` of the policy script. Allocates.
+    ///
+    /// # Errors
+    /// There is no script, or it refuses the parameter; it is as it was.
+    pub fn set_policy_parameter(&mut self, name: &str, value: f64) -> Result<(), HostError> {
+        let mut machine = self.machine.clone();
+        let Some(policy) = &mut machine.policy else {
+            return Err(HostError::System(
+                "the machine has no policy script".to_string(),
+            ));
+        };
+        policy.set_number(name, value);
+        PolicyHost::open(&machine)?;
+        self.machine = machine;
+        Ok(())
+    }
+
+    /// Checks a program from where the machine stands, with what has lasted, and makes the job that drives it. Every block goes to
+    /// `see`. Allocates.
     ///
     /// # Errors
     /// Everything that refuses: the program's errors, plugins, what does not go together.
@@ -246,6 +273,7 @@ impl<'r> Resident<'r> {
         program: Program,
         switches: Switches,
         memory: &Memory,
+        see: &mut dyn FnMut(&Block, Option<Curve<'_>>),
     ) -> Result<PreparedJob, HostError> {
         let (machine, switches) = (self.machine.clone(), self.on_clock(switches));
         let ready = Ready::of_program_on(
@@ -255,6 +283,7 @@ impl<'r> Resident<'r> {
             program,
             switches,
             memory,
+            see,
         )?;
         Ok(self.prepared(ready, 0))
     }

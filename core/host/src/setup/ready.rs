@@ -226,7 +226,7 @@ impl Ready {
     }
 
     /// Checks the whole program and makes everything for it, on drives that another has claimed, from where the machine stands
-    /// and with what has lasted from the jobs before. Host; allocates.
+    /// and with what has lasted from the jobs before. Every block goes to `see`. Host; allocates.
     ///
     /// # Errors
     /// Everything that refuses: the program's errors, plugins, policy, what does not go together.
@@ -237,12 +237,13 @@ impl Ready {
         mut program: Program,
         switches: Switches,
         memory: &Memory,
+        see: &mut dyn FnMut(&Block, Option<Curve<'_>>),
     ) -> Result<Self, HostError> {
         let plugins = Plugins::on_drives(&machine, registry, roster)?;
         plugins.joints.check_start(&machine)?;
         let simulated = roster.describe().simulated != 0;
         let config = memory.config(&machine, simulated, switches);
-        let passed = Passed::with(&machine, &plugins, &mut program, &config)?;
+        let passed = Passed::with(&machine, &plugins, &mut program, &config, see)?;
         plugins.check(&machine, switches)?;
         let policy = PolicyHost::open(&machine)?;
         feed(&machine, registry, &plugins.joints, policy.as_ref(), 0.0)?;
@@ -406,6 +407,7 @@ impl Passed {
             plugins,
             program,
             &parts::interpreter_config(machine, simulated, switches),
+            &mut |_, _| (),
         )
     }
 
@@ -415,6 +417,7 @@ impl Passed {
         plugins: &Plugins,
         program: &mut Program,
         config: &Config,
+        see: &mut dyn FnMut(&Block, Option<Curve<'_>>),
     ) -> Result<Self, HostError> {
         let depth_s =
             parts::queue_depth_s(machine, &plugins.joints, plugins.planner.describe().order);
@@ -424,7 +427,10 @@ impl Passed {
             plugins.planner.as_ref(),
             program,
             config,
-            &mut density,
+            &mut |block, curve| {
+                density.block(block);
+                see(block, curve);
+            },
         )?;
         if report.is_ok() {
             Ok(Self {
@@ -486,16 +492,16 @@ pub fn each_block(
     })?)
 }
 
-/// The whole program through the interpreter and `planner`, which stays as it was.
+/// The whole program through the interpreter and `planner`, which stays as it was; every block goes to `see` first.
 fn first_pass(
     machine: &Machine,
     planner: &dyn Planner,
     program: &mut Program,
     config: &Config,
-    density: &mut Density,
+    see: &mut dyn FnMut(&Block, Option<Curve<'_>>),
 ) -> Result<CheckReport, HostError> {
     Ok(check(program, config, &mut |block, curve| {
-        density.block(block);
+        see(block, curve);
         check_block(machine, planner, block, curve)
     })?)
 }

@@ -1,27 +1,31 @@
 //! Where all requests come together: what is done at once is done here, the rest is ordered of the loop that drives.
 
-use std::collections::VecDeque;
-use std::fmt::Write as _;
+use std::collections::{BTreeMap, VecDeque};
 use std::io::Write as _;
 use std::os::unix::net::UnixStream;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::sync::atomic::Ordering::{Acquire, Relaxed, Release};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use serde_json::{Value, json};
-use tandem_gcode::{Lasting, Tool, system_code};
+use sha2::{Digest, Sha256};
+use tandem_gcode::Lasting;
 use tandem_host::{Command, JobOutcome};
 use tandem_machine::Machine;
-use tandem_rings::{MachineState, Status};
+use tandem_rings::{MachineState, Status, Switched};
 use tandem_sdk::AxisVector;
 
 use super::described;
 use super::lines::{Judged, SharedLines, lock};
+use super::path::DrawnPath;
+use super::programs::{Upload, discard};
 use super::request::Asked;
+use super::scope::Scope;
 use super::states::{ControllerState, judge};
+use super::words::word_of;
 use crate::jog::{JogController, JogMessage, ReachMessage};
-use crate::operator::{OperatorHub, Position};
+use crate::operator::OperatorHub;
 
 /// Jobs and alarms that are remembered.
 const REMEMBERED: usize = 100;
@@ -109,6 +113,11 @@ pub enum Order {
     Disable {
         from: From,
     },
+    SetPolicyParameter {
+        from: From,
+        name: String,
+        value: f64,
+    },
 }
 
 /// A program that can be started.
@@ -116,6 +125,28 @@ pub enum Order {
 pub struct Loaded {
     pub name: String,
     pub text: Arc<[u8]>,
+    /// SHA-256 of the text, as `sha256sum` prints it.
+    pub hash: String,
+}
+
+impl Loaded {
+    /// A program, and its hash.
+    pub fn new(name: String, text: Arc<[u8]>) -> Self {
+        let digest = Sha256::digest(&text);
+        let hash = digest.iter().map(|byte| format!("{byte:02x}")).collect();
+        Self { name, text, hash }
+    }
+}
+
+/// What of the last sample is shown beside its place.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Seen {
+    /// The block that moves.
+    pub block: u64,
+    /// Where it ends; none where nothing moves.
+    pub end: Option<AxisVector>,
+    /// Spindle, coolant and outputs.
+    pub switched: Switched,
 }
 
 /// What is asked for, and what became of it.
@@ -131,6 +162,9 @@ pub struct Inner {
     pub aborting: bool,
     pub history: VecDeque<Value>,
     pub alarms: VecDeque<Value>,
+    /// Parameters of the policy script, as the next job has them.
+    pub policy_parameters: BTreeMap<String, f64>,
+    upload: Option<Upload>,
     last_state: Option<ControllerState>,
 }
 
@@ -138,12 +172,16 @@ pub struct Inner {
 pub struct Desk {
     pub machine: Machine,
     pub hub: Arc<OperatorHub>,
-    status: Arc<Status>,
+    pub status: Arc<Status>,
     pub lines: SharedLines,
     pub jogs: Arc<JogController>,
     pub keeper: Box<dyn Keeper>,
-    programs: Option<PathBuf>,
+    pub programs: Option<PathBuf>,
     inner: Mutex<Inner>,
+    path: Mutex<DrawnPath>,
+    scope: Mutex<Scope>,
+    seen: Mutex<Seen>,
+    frames: Mutex<Vec<(u64, String)>>,
     post: Mutex<Vec<(Option<u64>, String)>>,
     bell: (UnixStream, UnixStream),
     over: AtomicBool,
@@ -179,6 +217,8 @@ impl Desk {
             aborting: false,
             history: VecDeque::new(),
             alarms: VecDeque::new(),
+            policy_parameters: BTreeMap::new(),
+            upload: None,
             last_state: None,
         };
         Ok(Self {
@@ -190,6 +230,10 @@ impl Desk {
             keeper,
             programs,
             inner: Mutex::new(inner),
+            path: Mutex::new(DrawnPath::new(machine.axes)),
+            scope: Mutex::new(Scope::new(machine)),
+            seen: Mutex::default(),
+            frames: Mutex::default(),
             post: Mutex::default(),
             bell,
             over: AtomicBool::new(false),
@@ -199,6 +243,34 @@ impl Desk {
     pub fn lock(&self) -> MutexGuard<'_, Inner> {
         // What lies in it is whole after every statement.
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The path that is drawn.
+    pub fn path(&self) -> MutexGuard<'_, DrawnPath> {
+        self.path.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Who looks at which signals.
+    pub fn scope(&self) -> MutexGuard<'_, Scope> {
+        self.scope.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// What of the last sample is shown.
+    pub fn seen(&self) -> MutexGuard<'_, Seen> {
+        self.seen.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// A client is gone.
+    pub fn forget(&self, client: u64) {
+        self.scope().forget(client);
+        let mut inner = self.lock();
+        if inner
+            .upload
+            .as_ref()
+            .is_some_and(|upload| upload.is_by(client))
+        {
+            discard(&mut inner.upload);
+        }
     }
 
     /// The machine is to come to rest and its drives are to let go, for good.
@@ -218,6 +290,26 @@ impl Desk {
             .push((to, format!("{line}\n")));
         // Where it rings already, it rings.
         let _ = (&self.bell.1).write(&[1]);
+    }
+
+    /// Sends what the scope has for those who look; with `all` the job is over.
+    pub fn send_scope(&self, all: bool) {
+        let (frames, done) = self.scope().take(all);
+        if !frames.is_empty() {
+            let mut waiting = self.frames.lock().unwrap_or_else(PoisonError::into_inner);
+            waiting.extend(frames.into_iter().map(|frame| (frame.client, frame.text)));
+            drop(waiting);
+            // Where it rings already, it rings.
+            let _ = (&self.bell.1).write(&[1]);
+        }
+        for (client, event) in done {
+            self.send(Some(client), &event);
+        }
+    }
+
+    /// Frames of the scope: what a client may lose.
+    pub fn take_frames(&self) -> Vec<(u64, String)> {
+        std::mem::take(&mut *self.frames.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
     pub fn take_post(&self) -> Vec<(Option<u64>, String)> {
@@ -244,7 +336,7 @@ impl Desk {
         self.state_of(&self.lock())
     }
 
-    fn state_of(&self, inner: &Inner) -> ControllerState {
+    pub fn state_of(&self, inner: &Inner) -> ControllerState {
         if let Some((_, emergency)) = &inner.fault {
             return if *emergency {
                 ControllerState::EmergencyStop
@@ -302,30 +394,14 @@ impl Desk {
         if let Err(why) = judge(self.state_of(&inner), name) {
             return Some(Err(why.to_string()));
         }
-        let seen = [
-            "status",
-            "subscribe",
-            "history",
-            "lease",
-            "list",
-            "machine",
-            "tables",
-            "emergency-stop",
-            "hold",
-            "abort",
-        ];
-        let is_switch = [
-            "feed-override",
-            "rapid-override",
-            "single-block",
-            "optional-stop",
-            "block-delete",
-        ];
+        if let Some(Err(why)) = word_of(name).map(|word| word.check(&asked.with)) {
+            return Some(Err(why));
+        }
         let joins = matches!(
             (&inner.order, name),
             (Some(Order::Mdi), "mdi") | (Some(Order::Jog), "jog" | "jog-stop")
         );
-        if inner.order.is_some() && !joins && !seen.contains(&name) && !is_switch.contains(&name) {
+        if inner.order.is_some() && !joins && begins_or_sets(name) {
             return Some(Err(
                 "another request is being begun: wait for its answer".to_string()
             ));
@@ -352,25 +428,43 @@ impl Desk {
                 .give(command)
                 .map(|tick| Acted::Done(json!({ "tick": tick })))
         };
-        let plain = |command: Command| asked.only(&[]).and_then(|()| give(command));
         match name {
-            "status" => asked.only(&[]).map(|()| Acted::Done(self.status_of(inner))),
+            "status" => Ok(Acted::Done(self.status_of(inner))),
             "history" => Ok(Acted::Done(
                 json!({ "jobs": inner.history, "alarms": inner.alarms }),
             )),
             "list" => self.list().map(Acted::Done),
-            "machine" => asked
-                .only(&[])
-                .map(|()| Acted::Done(described::machine(&self.machine))),
-            "tables" => asked.only(&[]).map(|()| {
+            "machine" => Ok(Acted::Done(described::machine(&self.machine))),
+            "tables" => {
                 let lasting = lock(&self.lines).standing().lasting();
-                Acted::Done(described::tables(&self.machine, &lasting))
-            }),
-            "hold" => plain(Command::Hold),
-            "resume" => plain(Command::Resume),
-            "emergency-stop" => plain(Command::EmergencyStop),
+                Ok(Acted::Done(described::tables(&self.machine, &lasting)))
+            }
+            "path" => {
+                let from = |key: &str| asked.whole_if_any(key).unwrap_or(0);
+                Ok(Acted::Done(
+                    self.path().show(from("from"), from("driven_from")),
+                ))
+            }
+            "scope" => self.scope().watch(from.client, asked).map(Acted::Done),
+            "capture" => self.scope().arm(from.client, asked).map(Acted::Done),
+            "captured" => {
+                let first = asked.whole_if_any("from").unwrap_or(0) as usize;
+                self.scope().captured(from.client, first).map(Acted::Done)
+            }
+            "policy-parameters" => Ok(Acted::Done(
+                json!({ "parameters": inner.policy_parameters }),
+            )),
+            "set-policy-parameter" => Ok(Acted::Ordered(Order::SetPolicyParameter {
+                from,
+                name: asked.text("name")?.to_string(),
+                value: asked.number("value")?,
+            })),
+            "upload" => self.upload(from, asked, &mut inner.upload).map(Acted::Done),
+            "hold" => give(Command::Hold),
+            "resume" => give(Command::Resume),
+            "emergency-stop" => give(Command::EmergencyStop),
             "abort" => {
-                let done = plain(Command::Abort)?;
+                let done = give(Command::Abort)?;
                 inner.aborting = true;
                 self.jogs.forget();
                 Ok(done)
@@ -398,7 +492,6 @@ impl Desk {
                 }))
             }
             "start" => {
-                asked.only(&[])?;
                 let missing = "no program is loaded: \"load\" loads one";
                 inner
                     .loaded
@@ -407,7 +500,6 @@ impl Desk {
                     .ok_or_else(|| missing.to_string())
             }
             "mdi" => {
-                asked.only(&["line"])?;
                 let begins = lock(&self.lines).judge(from.client, from.id, asked.text("line")?)?;
                 let judged = json!({ "judged": true });
                 let waits = inner.mode == Mode::Mdi || inner.order.is_some() || !begins;
@@ -423,7 +515,7 @@ impl Desk {
             }
             "jog" => {
                 let jog = jog(asked)?.on(&self.machine.axes)?;
-                if asked.with.get("again") == Some(&json!(true)) {
+                if asked.is_on("again") {
                     self.jogs.keep_alive(jog)?;
                     return Ok(Acted::Done(json!({ "jog": asked.with.get("axis") })));
                 }
@@ -437,13 +529,11 @@ impl Desk {
                 })
             }
             "home" => {
-                asked.only(&["axis"])?;
-                let axis = if asked.with.contains_key("axis") {
-                    Some(self.axis(asked.text("axis")?)?)
-                } else {
-                    None
-                };
-                Ok(Acted::Ordered(Order::Home { from, axis }))
+                let axis = asked.text_if_any("axis").map(|axis| self.axis(axis));
+                Ok(Acted::Ordered(Order::Home {
+                    from,
+                    axis: axis.transpose()?,
+                }))
             }
             "reset" => Ok(Acted::Ordered(Order::Enable { from, resets: true })),
             "enable" => Ok(Acted::Ordered(Order::Enable {
@@ -458,95 +548,6 @@ impl Desk {
         }
     }
 
-    /// Changes what lasts; it is on disk when this returns.
-    fn set(&self, asked: &Asked, name: &str) -> Result<Value, String> {
-        let mut lines = lock(&self.lines);
-        let axes = &self.machine.axes;
-        // Axis words in mm and deg, as keys such as x_mm and a_deg.
-        let mut words = String::new();
-        for axis in 0..axes.count() {
-            let letter = axes.letter(axis);
-            let unit = if axes.is_rotary(axis) { "deg" } else { "mm" };
-            if let Some(value) =
-                asked.number_if_any(&format!("{}_{unit}", letter.to_ascii_lowercase()))?
-            {
-                // A string takes whatever is written to it.
-                let _ = write!(words, " {letter}[{value:.9}]");
-            }
-        }
-        let lasting = match name {
-            "touch-off" | "set-offset" => {
-                let system = match asked.with.get("system") {
-                    None => 0,
-                    Some(name) => (0..tandem_gcode::WORK_SYSTEMS)
-                        .find(|i| Some(system_code(*i).as_str()) == name.as_str())
-                        .map(|i| i + 1)
-                        .ok_or_else(|| {
-                            format!(
-                                "{name} is no work coordinate system: G54 to G59, G59.1 to G59.3"
-                            )
-                        })?,
-                };
-                if words.is_empty() {
-                    return Err(format!(
-                        "{name} needs the coordinate of at least one axis, as in \"x_mm\""
-                    ));
-                }
-                let number = if name == "touch-off" { 20 } else { 2 };
-                lines.lasting_behind(&format!("G10 L{number} P{system}{words}"))?
-            }
-            "set-parameter" => {
-                let (number, value) = (asked.number("number")?, asked.number("value")?);
-                if !(31.0..=5000.0).contains(&number) || number.fract() != 0.0 {
-                    return Err("a parameter that lasts has a number from 31 to 5000".to_string());
-                }
-                let mut lasting = lines.standing().lasting();
-                lasting.parameters.insert(number as u32, value);
-                lasting
-            }
-            _ => self.with_tool(lines.standing().lasting(), asked)?,
-        };
-        self.keeper.commit(&lasting)?;
-        lines.set_lasting(&lasting);
-        Ok(json!({ "set": name }))
-    }
-
-    fn with_tool(&self, mut lasting: Lasting, asked: &Asked) -> Result<Lasting, String> {
-        let number = asked.number("number")?;
-        if !(0.0..=99_999.0).contains(&number) || number.fract() != 0.0 {
-            return Err("a tool has a number from 1 to 99999; 0 is the empty spindle".to_string());
-        }
-        let number = number as u32;
-        if asked.with.get("in_spindle").and_then(Value::as_bool) == Some(true) {
-            lasting.tool_in_spindle = number;
-        }
-        let at = lasting.tools.iter().position(|tool| tool.number == number);
-        let mut tool = at.map_or(
-            Tool {
-                number,
-                pocket: None,
-                offset: AxisVector::ZERO,
-                diameter_mm: 0.0,
-            },
-            |at| lasting.tools[at],
-        );
-        for axis in 0..self.machine.axes.count() {
-            let letter = self.machine.axes.letter(axis).to_ascii_lowercase();
-            if let Some(mm) = asked.number_if_any(&format!("{letter}_mm"))? {
-                tool.offset[axis] = mm;
-            }
-        }
-        if let Some(mm) = asked.number_if_any("diameter_mm")? {
-            tool.diameter_mm = mm;
-        }
-        match at {
-            _ if number == 0 => {}
-            Some(at) => lasting.tools[at] = tool,
-            None => lasting.tools.push(tool),
-        }
-        Ok(lasting)
-    }
-
     fn axis(&self, letter: &str) -> Result<usize, String> {
         let mut letters = letter.chars();
         let one = letters
@@ -557,116 +558,12 @@ impl Desk {
             .ok_or_else(|| format!("the machine has no axis {letter}"))
     }
 
-    /// A program, as text or as a file of the programs folder.
-    fn program_of(&self, asked: &Asked) -> Result<Loaded, String> {
-        asked.only(&["path", "text", "name"])?;
-        if asked.with.contains_key("text") {
-            let name = asked
-                .with
-                .get("name")
-                .and_then(Value::as_str)
-                .unwrap_or("program.ngc")
-                .to_string();
-            return Ok(Loaded {
-                name,
-                text: asked.text("text")?.as_bytes().into(),
-            });
-        }
-        let path = asked.text("path")?;
-        let folder = self.folder()?;
-        let safe = Path::new(path)
-            .components()
-            .all(|part| matches!(part, std::path::Component::Normal(_)));
-        if !safe {
-            return Err(format!(
-                "{path}: a program is named by its path within the programs folder"
-            ));
-        }
-        let file = folder.join(path);
-        let size = std::fs::metadata(&file)
-            .map_err(|e| format!("{}: {e}", file.display()))?
-            .len();
-        if size > MAX_PROGRAM_BYTES {
-            return Err(format!(
-                "{path}: it has {size} bytes, {MAX_PROGRAM_BYTES} are allowed"
-            ));
-        }
-        let text = std::fs::read(&file).map_err(|e| format!("{}: {e}", file.display()))?;
-        Ok(Loaded {
-            name: path.to_string(),
-            text: text.into(),
-        })
-    }
-
-    fn folder(&self) -> Result<&Path, String> {
-        let missing = "there is no programs folder: tandem serve --programs FOLDER names one";
-        self.programs.as_deref().ok_or_else(|| missing.to_string())
-    }
-
-    fn list(&self) -> Result<Value, String> {
-        let folder = self.folder()?;
-        let entries =
-            std::fs::read_dir(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-        let files = entries
-            .filter_map(Result::ok)
-            .filter(|entry| entry.path().is_file());
-        let mut names: Vec<String> = files
-            .map(|entry| entry.file_name().to_string_lossy().into_owned())
-            .collect();
-        names.sort();
-        Ok(json!({ "programs": names }))
-    }
-
-    /// Everything that can be seen. Allocates.
-    pub fn status(&self) -> Value {
-        self.status_of(&self.lock())
-    }
-
-    fn status_of(&self, inner: &Inner) -> Value {
-        let mut status = serde_json::to_value(self.hub.status()).unwrap_or_default();
-        let lines = lock(&self.lines);
-        let standing = lines.standing();
-        let lasting = standing.lasting();
-        let axes = &self.machine.axes;
-        let place = self.hub.position();
-        let shown = |vector: &AxisVector| {
-            serde_json::to_value(Position::new(axes, vector)).unwrap_or_default()
-        };
-        let letters = |mask: u32| -> Vec<String> {
-            let of = (0..axes.count()).filter(|axis| mask >> axis & 1 == 1);
-            of.map(|axis| axes.letter(axis).to_ascii_lowercase().to_string())
-                .collect()
-        };
-        let more = json!({
-            "state": self.state_of(inner).name(),
-            "loop_state": status["state"],
-            "job": (inner.mode != Mode::Idle).then(|| inner.mode.name()),
-            "program": inner.loaded.as_ref().map(|program| program.name.clone()),
-            "work_position": shown(&standing.to_program(&place)),
-            "not_homed": letters(inner.unknown_axes),
-            "modal": standing.modal_words(),
-            "system": system_code(lasting.active_system),
-            "offset": shown(&lasting.origins[lasting.active_system]),
-            "g92": shown(&lasting.g92),
-            "tool": lasting.tool_in_spindle,
-            "tool_offset": shown(&lasting.tool_offset),
-            "spindle_rpm": self.status.spindle.told_rad_per_s.load() * 30.0 / std::f64::consts::PI,
-            "spindle_turns_rpm": self.status.spindle.turns_rad_per_s.load() * 30.0 / std::f64::consts::PI,
-            "block_delete": inner.block_delete,
-            "fault": inner.fault.as_ref().map(|(words, _)| words.clone()),
-            "alarms": inner.alarms.len(),
-        });
-        if let (Value::Object(all), Value::Object(more)) = (&mut status, more) {
-            all.extend(more);
-        }
-        status
-    }
-
     /// A job begins. The loop that drives.
     pub fn begin(&self, mode: Mode) {
         let mut inner = self.lock();
         (inner.mode, inner.order, inner.aborting) = (mode, None, false);
         drop(inner);
+        *self.seen() = Seen::default();
         self.hub.begin_job();
         self.tell_state();
     }
@@ -683,6 +580,12 @@ impl Desk {
         self.tell_driven(&driven, whole);
         self.keeper.record(&lock(&self.lines).standing().lasting());
         self.hub.stands_at(&outcome.position);
+        self.path().drive(&outcome.position);
+        self.send_scope(true);
+        *self.seen() = Seen {
+            switched: outcome.left.switched,
+            ..Seen::default()
+        };
         let fault = outcome.summary.fault.clone();
         let how = match (&fault, outcome.aborted) {
             (Some(_), _) => "fault",
@@ -752,6 +655,28 @@ enum Acted {
     Ordered(Order),
 }
 
+/// Whether a request begins a job or changes what one begins with: one at a time.
+fn begins_or_sets(name: &str) -> bool {
+    [
+        "load",
+        "check",
+        "start",
+        "mdi",
+        "jog",
+        "home",
+        "reset",
+        "enable",
+        "disable",
+        "touch-off",
+        "set-offset",
+        "set-tool",
+        "set-parameter",
+        "set-policy-parameter",
+        "resume",
+    ]
+    .contains(&name)
+}
+
 fn remember(all: &mut VecDeque<Value>, one: Value) {
     all.push_back(one);
     if all.len() > REMEMBERED {
@@ -769,15 +694,6 @@ fn ratio(value: f64) -> Result<f64, String> {
 
 /// A jog as clients ask for it.
 fn jog(asked: &Asked) -> Result<JogMessage, String> {
-    asked.only(&[
-        "axis",
-        "distance_mm",
-        "distance_deg",
-        "direction",
-        "again",
-        "feed_mm_per_min",
-        "feed_deg_per_min",
-    ])?;
     let axis = asked
         .text("axis")?
         .chars()

@@ -4,11 +4,21 @@
 mod described;
 mod desk;
 mod lines;
+mod path;
+mod programs;
 mod request;
+mod schema;
+mod scope;
+mod seeing;
 mod serve;
+mod settings;
 mod states;
 mod talk;
+mod watch;
+mod words;
 
 pub use desk::{Keeper, NoKeeper};
+pub use schema::{requests_table, schema};
 pub use serve::{Controller, Options, ScriptLine};
 pub use states::{ControllerState, judge, requests, table};
+pub use words::{Key, Kind, Role, WORDS, Word};

@@ -81,18 +81,24 @@ impl Asked {
         on.ok_or_else(|| format!("{} needs \"on\", true or false", self.request))
     }
 
-    /// Refuses keys that the request does not know.
-    ///
-    /// # Errors
-    /// The first that it does not know, and those that it does.
-    pub fn only(&self, keys: &[&str]) -> Result<(), String> {
-        match self.with.keys().find(|key| !keys.contains(&key.as_str())) {
-            Some(key) => Err(format!(
-                "{} does not know \"{key}\"; it knows {}",
-                self.request,
-                keys.join(", ")
-            )),
-            None => Ok(()),
-        }
+    /// The text of `key`, if it is there.
+    pub fn text_if_any(&self, key: &str) -> Option<&str> {
+        self.with.get(key).and_then(Value::as_str)
+    }
+
+    /// The texts of `key`; none where it is not there.
+    pub fn texts(&self, key: &str) -> Vec<&str> {
+        let all = self.with.get(key).and_then(Value::as_array);
+        all.map_or(vec![], |all| all.iter().filter_map(Value::as_str).collect())
+    }
+
+    /// The whole number of `key`, if it is there.
+    pub fn whole_if_any(&self, key: &str) -> Option<u64> {
+        self.with.get(key).and_then(Value::as_u64)
+    }
+
+    /// Whether the switch `key` is there and on.
+    pub fn is_on(&self, key: &str) -> bool {
+        self.with.get(key).and_then(Value::as_bool) == Some(true)
     }
 }

@@ -1,28 +1,25 @@
 //! The loop that drives: orders of the desk become jobs, one after the other.
 
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
-use std::time::Instant;
 
 use serde_json::{Value, json};
-use tandem_gcode::{Interpreter, Item, Lasting, Program};
+use tandem_gcode::{Interpreter, Lasting, Program};
 use tandem_host::{
-    Clock, HostError, JobOutcome, Memory, PreparedJob, Registry, Resident, RunObserver, StopAnswer,
-    Switches, axis_limits, interpreter_config, moves_metal, planner,
+    Clock, HostError, JobOutcome, Memory, PreparedJob, Registry, Resident, RunObserver, Switches,
+    axis_limits, interpreter_config, moves_metal, planner,
 };
 use tandem_machine::Machine;
-use tandem_rings::{Rest, Sample};
-use tandem_rough::Source;
 
 use super::desk::{Desk, From, Keeper, Loaded, Mode, Order};
 use super::lines::{LineSource, Lines, lock};
-use super::talk::{Office, Protocol2};
+use super::path::DrawnPath;
+use super::talk::Office;
+use super::watch::{Jogs, Notes, Script, Watch};
 use crate::HOMING;
 use crate::jog::JogController;
-use crate::operator::{Lease, Listen, OperatorHub, Server, Talk};
-use crate::standing::Standing;
+use crate::operator::{Listen, OperatorHub, Server};
 
 /// What a controller is asked for.
 pub struct Options {
@@ -147,10 +144,7 @@ impl<'r> Controller<'r> {
         } else {
             Some(Server::of(Arc::new(Office(Arc::clone(&desk))), &options.listen).map_err(system)?)
         };
-        let script = Script {
-            lines: options.script.into(),
-            ..Script::default()
-        };
+        let script = Script::of(options.script);
         Ok(Self {
             resident,
             desk,
@@ -234,10 +228,7 @@ impl<'r> Controller<'r> {
                 self.drive_or_tell(job, None, Mode::Mdi, "lines by hand", tell)?;
             }
             Order::Jog => {
-                let source = Box::new(Jogs {
-                    desk: Arc::clone(&self.desk),
-                    standing: Standing::default(),
-                });
+                let source = Box::new(Jogs::new(Arc::clone(&self.desk)));
                 let switches = Switches {
                     unhomed: true,
                     ..self.switches()
@@ -259,6 +250,9 @@ impl<'r> Controller<'r> {
                 drop(inner);
                 self.desk.answer(from, Ok(json!({ "disabled": true })));
             }
+            Order::SetPolicyParameter { from, name, value } => {
+                self.set_policy_parameter(from, &name, value);
+            }
         }
         Ok(())
     }
@@ -279,7 +273,21 @@ impl<'r> Controller<'r> {
         }
     }
 
-    fn prepare(&self, program: &Loaded) -> Result<PreparedJob, String> {
+    fn set_policy_parameter(&mut self, from: From, name: &str, value: f64) {
+        let set = self.resident.set_policy_parameter(name, value);
+        let parameters = self.resident.policy_parameters();
+        let mut inner = self.desk.lock();
+        inner.order = None;
+        inner.policy_parameters.clone_from(&parameters);
+        drop(inner);
+        let answer = set
+            .map(|()| json!({ "parameters": parameters }))
+            .map_err(|e| e.to_string());
+        self.desk.answer(from, answer);
+    }
+
+    /// Checks a program and makes the job that drives it; the path is that which is drawn from now on.
+    fn prepare(&self, program: &Loaded, drawn: &mut DrawnPath) -> Result<PreparedJob, String> {
         let spooled =
             Program::spool(&program.name, &program.text[..]).map_err(|e| e.to_string())?;
         let switches = Switches {
@@ -287,7 +295,9 @@ impl<'r> Controller<'r> {
             ..self.switches()
         };
         self.resident
-            .program(spooled, switches, &self.memory())
+            .program(spooled, switches, &self.memory(), &mut |block, curve| {
+                drawn.block(block, curve);
+            })
             .map_err(|e| match e {
                 HostError::Check(report) => {
                     let all: Vec<String> =
@@ -303,10 +313,11 @@ impl<'r> Controller<'r> {
     }
 
     fn check(&mut self, from: From, program: &Loaded, load: bool) {
-        let checked = self.prepare(program).map(|job| {
+        let mut drawn = DrawnPath::new(self.resident.machine().axes);
+        let checked = self.prepare(program, &mut drawn).map(|job| {
             let report = job.checked();
             json!({
-                "program": program.name, "blocks": report.blocks, "length_mm": report.length_mm,
+                "program": program.name, "hash": program.hash, "blocks": report.blocks, "length_mm": report.length_mm,
                 "warnings": report.warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
             })
         });
@@ -314,6 +325,7 @@ impl<'r> Controller<'r> {
         inner.order = None;
         if checked.is_ok() && load {
             inner.loaded = Some(program.clone());
+            self.desk.path().become_that_of(drawn, &program.name);
         }
         drop(inner);
         self.desk.answer(from, checked);
@@ -322,13 +334,18 @@ impl<'r> Controller<'r> {
     fn start(&mut self, from: From, tell: Tell<'_>) -> Result<(), HostError> {
         let loaded = self.desk.lock().loaded.clone();
         let Some(program) = loaded else { return Ok(()) };
-        match self.prepare(&program) {
+        let mut drawn = DrawnPath::new(self.resident.machine().axes);
+        match self.prepare(&program, &mut drawn) {
             Err(why) => {
                 self.desk.lock().order = None;
                 self.desk.answer(from, Err(why));
                 Ok(())
             }
-            Ok(job) => self.drive(job, Some(from), Mode::Program, &program.name, tell),
+            Ok(job) => {
+                // As it is driven: offsets may be others than when it was loaded.
+                self.desk.path().become_that_of(drawn, &program.name);
+                self.drive(job, Some(from), Mode::Program, &program.name, tell)
+            }
         }
     }
 
@@ -372,6 +389,10 @@ impl<'r> Controller<'r> {
         tell: Tell<'_>,
     ) -> Result<(), HostError> {
         let length_mm = job.checked().length_mm;
+        if mode != Mode::Program {
+            self.desk.path().begin(name, true);
+        }
+        self.desk.scope().begin_job(&job.signals());
         self.desk.begin(mode);
         if let Some(from) = from {
             self.desk.answer(from, Ok(json!({ "begins": name })));
@@ -428,186 +449,4 @@ impl<'r> Controller<'r> {
 fn not_homed(machine: &Machine, unknown: u32) -> u32 {
     let all = (1_u32 << machine.axes.count()) - 1;
     unknown & all
-}
-
-/// Lines of clients by fine periods, on the virtual clock.
-#[derive(Default)]
-struct Script {
-    lines: std::collections::VecDeque<ScriptLine>,
-    clients: BTreeMap<u64, Protocol2>,
-    lease: Lease,
-}
-
-impl Script {
-    fn say_due(&mut self, desk: &Arc<Desk>, tick: u64, tell: Tell<'_>) {
-        while self.lines.front().is_some_and(|line| line.tick <= tick) {
-            let Some(ScriptLine { client, line, .. }) = self.lines.pop_front() else {
-                return;
-            };
-            let talk = self
-                .clients
-                .entry(client)
-                .or_insert_with(|| Protocol2::known(Arc::clone(desk), client));
-            // Subscriptions live in real time, and are not for replays.
-            let answer = talk.line(&line, &mut self.lease, Instant::now());
-            Self::print(tick, Some(client), &answer.line, tell);
-        }
-    }
-
-    fn print(tick: u64, client: Option<u64>, line: &str, tell: Tell<'_>) {
-        if let Ok(told) = serde_json::from_str::<Value>(line) {
-            tell(&json!({ "tick": tick, "client": client, "told": told }).to_string());
-        }
-    }
-
-    fn flush(desk: &Desk, tick: u64, clock: Clock, tell: Tell<'_>) {
-        if clock == Clock::Virtual {
-            for (client, line) in desk.take_post() {
-                Self::print(tick, client, &line, tell);
-            }
-        }
-    }
-}
-
-/// Takes notes only.
-struct Notes<'a>(Tell<'a>);
-
-impl RunObserver for Notes<'_> {
-    fn note(&mut self, note: &str) {
-        (self.0)(note);
-    }
-}
-
-/// Sees what a job does, for the desk; in lockstep it says what the script says.
-struct Watch<'a> {
-    desk: &'a Arc<Desk>,
-    script: &'a mut Script,
-    tell: Tell<'a>,
-    mode: Mode,
-    clock: Clock,
-    length_mm: f64,
-    driven_mm: f64,
-    block: Option<u64>,
-    tick: u64,
-    ends: bool,
-}
-
-impl<'a> Watch<'a> {
-    fn new(
-        desk: &'a Arc<Desk>,
-        script: &'a mut Script,
-        tell: Tell<'a>,
-        mode: Mode,
-        clock: Clock,
-        length_mm: f64,
-    ) -> Self {
-        Self {
-            desk,
-            script,
-            tell,
-            mode,
-            clock,
-            length_mm,
-            driven_mm: 0.0,
-            block: None,
-            tick: 0,
-            ends: false,
-        }
-    }
-}
-
-impl RunObserver for Watch<'_> {
-    fn note(&mut self, note: &str) {
-        (self.tell)(note);
-    }
-
-    fn program_stop(&mut self, line: u32) -> StopAnswer {
-        let hub = &self.desk.hub;
-        if hub.waits_on_line().is_none() {
-            hub.begin_wait(line);
-            self.desk
-                .send(None, &json!({ "event": "waits", "line": line }));
-            return StopAnswer::Wait;
-        }
-        if hub.answered() {
-            StopAnswer::GoOn
-        } else {
-            StopAnswer::Wait
-        }
-    }
-
-    fn is_attended(&self) -> bool {
-        self.clock == Clock::Wall || !self.script.lines.is_empty()
-    }
-
-    fn rest(&mut self, _rest: &Rest) {
-        self.desk.hub.end_wait();
-    }
-
-    fn sample(&mut self, sample: &Sample, _deviation_mm: f64, _signals: &[f64]) {
-        self.driven_mm += sample.feed_mm_per_s * self.desk.machine.fine_period_s;
-        let share = if self.length_mm > 0.0 {
-            (self.driven_mm / self.length_mm).min(1.0)
-        } else {
-            0.0
-        };
-        self.desk.hub.sample(sample, share);
-        if self.block != Some(sample.block) && matches!(self.mode, Mode::Program | Mode::Mdi) {
-            self.block = Some(sample.block);
-            let driven = lock(&self.desk.lines).reach(sample.block);
-            self.desk.tell_driven(&driven, true);
-        }
-    }
-
-    fn period(&mut self) {
-        if self.desk.is_over() && !self.ends && self.mode != Mode::Idle {
-            self.ends = true;
-            self.desk.hub.controls().abort.store(true, Relaxed);
-        }
-        self.desk.tell_state();
-        Script::flush(self.desk, self.tick, self.clock, self.tell);
-    }
-
-    fn before_tick(&mut self, uptime_periods: u64) {
-        self.tick = uptime_periods;
-        self.script.say_due(self.desk, uptime_periods, self.tell);
-    }
-}
-
-/// The jogs that wait, as the rough loop pulls them, until none does.
-struct Jogs {
-    desk: Arc<Desk>,
-    standing: Standing,
-}
-
-impl Source for Jogs {
-    fn may_go_on(&mut self, driven: bool) -> bool {
-        self.standing.look(driven);
-        if self.standing.is_still() {
-            let _ = self.desk.jogs.arrived();
-        }
-        self.standing.is_still()
-    }
-
-    fn next_items(&mut self, items: &mut Vec<Item>) -> Result<bool, String> {
-        let (_, refused) = self.desk.jogs.next(items);
-        for why in refused {
-            self.desk.send(
-                None,
-                &json!({ "event": "refused", "job": "jogging", "why": why }),
-            );
-        }
-        if !items.is_empty() {
-            self.standing.moves();
-        }
-        Ok(!items.is_empty() || !self.desk.jogs.is_still())
-    }
-
-    fn provide_input(&mut self, _value: f64) {}
-
-    fn provide_rest(&mut self, rest: &Rest) -> bool {
-        self.standing.moves();
-        let _ = self.desk.jogs.rests(rest);
-        true
-    }
 }

@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use super::words::{WORDS, word_of};
+
 /// What the machine is doing, as operators are told it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ControllerState {
@@ -59,42 +61,6 @@ impl ControllerState {
     }
 }
 
-/// Requests and, in the order of [`ControllerState`], whether each is done (`+`) or which of [`REASONS`] refuses it.
-#[rustfmt::skip]
-const TABLE: [(&str, &str); 30] = [
-    //                 E D N R J M P H S F
-    ("status",         "++++++++++"),
-    ("subscribe",      "++++++++++"),
-    ("history",        "++++++++++"),
-    ("lease",          "++++++++++"),
-    ("list",           "++++++++++"),
-    ("machine",        "++++++++++"),
-    ("tables",         "++++++++++"),
-    ("load",           "++++bbbbs+"),
-    ("check",          "++++bbbbs+"),
-    ("start",          "fdn+bbbbsf"),
-    ("hold",           "xxxx+++++x"),
-    ("resume",         "xxxx++++sx"),
-    ("abort",          "xxxx+++++x"),
-    ("emergency-stop", "++++++++++"),
-    ("feed-override",  "++++++++++"),
-    ("rapid-override", "++++++++++"),
-    ("single-block",   "++++++++++"),
-    ("optional-stop",  "++++++++++"),
-    ("block-delete",   "++++++++++"),
-    ("mdi",            "fdn+b+bbsf"),
-    ("jog",            "fd+++bbbsf"),
-    ("jog-stop",       "xxxx++++++"),
-    ("home",           "fd++bbbbsf"),
-    ("touch-off",      "fdn+bbbbsf"),
-    ("set-offset",     "++++bbbbs+"),
-    ("set-tool",       "++++bbbbs+"),
-    ("set-parameter",  "++++bbbbs+"),
-    ("reset",          "+kkkkkkks+"),
-    ("enable",         "f+eeeeeesf"),
-    ("disable",        "fo++bbbbsf"),
-];
-
 /// Why a request is refused.
 const REASONS: [(char, &str); 9] = [
     ('b', "a job is driven: wait for its end, or abort it"),
@@ -122,10 +88,10 @@ const REASONS: [(char, &str); 9] = [
 /// # Errors
 /// Why not, in words; a request that is none is refused in every state.
 pub fn judge(state: ControllerState, request: &str) -> Result<(), &'static str> {
-    let Some((_, row)) = TABLE.iter().find(|(name, _)| *name == request) else {
+    let Some(word) = word_of(request) else {
         return Err("there is no such request");
     };
-    match row.chars().nth(state as usize) {
+    match word.states.chars().nth(state as usize) {
         Some('+') => Ok(()),
         code => Err(REASONS
             .iter()
@@ -136,7 +102,7 @@ pub fn judge(state: ControllerState, request: &str) -> Result<(), &'static str> 
 
 /// Names of all requests that the table judges.
 pub fn requests() -> impl Iterator<Item = &'static str> {
-    TABLE.iter().map(|(name, _)| *name)
+    WORDS.iter().map(|word| word.name)
 }
 
 /// The table as the documentation prints it. Allocates.
@@ -147,7 +113,8 @@ pub fn table() -> String {
     }
     text.push_str("\n|---|");
     text.push_str(&"---|".repeat(ControllerState::ALL.len()));
-    for (name, row) in TABLE {
+    for word in WORDS {
+        let (name, row) = (word.name, word.states);
         let _ = write!(text, "\n| `{name}` |");
         for code in row.chars() {
             let _ = write!(
@@ -174,7 +141,8 @@ mod tests {
 
     #[test]
     fn every_request_has_an_answer_in_every_state() {
-        for (name, row) in TABLE {
+        for word in WORDS {
+            let (name, row) = (word.name, word.states);
             assert_eq!(row.chars().count(), ControllerState::ALL.len(), "{name}");
             for state in ControllerState::ALL {
                 let answer = judge(state, name);

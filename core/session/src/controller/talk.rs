@@ -3,10 +3,11 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use super::desk::{Desk, From};
 use super::request::{Asked, read};
+use super::words::{Role, word_of};
 use crate::operator::{Answer, House, Lease, MAX_OWNERS, News, Problem, Talk, is_same};
 
 /// The protocol's number, in the greeting.
@@ -16,20 +17,6 @@ const MAX_LINE_BYTES: usize = 8 << 20;
 const MAX_STRANGERS_LINE_BYTES: usize = 4096;
 /// Lowest and highest rate of a subscription, Hz.
 const RATES_HZ: std::ops::RangeInclusive<f64> = 0.01..=100.0;
-/// Requests that need no control lease.
-const FREE: [&str; 10] = [
-    "status",
-    "subscribe",
-    "history",
-    "lease",
-    "list",
-    "machine",
-    "tables",
-    "hold",
-    "emergency-stop",
-    "token",
-];
-
 /// Who lives behind the doors of a controller.
 pub struct Office(pub Arc<Desk>);
 
@@ -40,6 +27,7 @@ impl House for Office {
             client: number,
             token,
             has_place: true,
+            role: Role::SetUp,
             subscription: None,
         })
     }
@@ -48,6 +36,10 @@ impl House for Office {
 
     fn post(&self) -> Vec<(Option<u64>, String)> {
         self.0.take_post()
+    }
+
+    fn frames(&self) -> Vec<(u64, String)> {
+        self.0.take_frames()
     }
 
     fn bell(&self) -> Option<&std::os::unix::net::UnixStream> {
@@ -61,7 +53,19 @@ pub struct Protocol2 {
     client: u64,
     token: Option<String>,
     has_place: bool,
-    subscription: Option<(Duration, Instant)>,
+    role: Role,
+    subscription: Option<Subscription>,
+}
+
+/// Status lines that a client has asked for.
+struct Subscription {
+    every: Duration,
+    due: Instant,
+    /// These fields alone; all where it names none.
+    fields: Vec<String>,
+    /// Only what is otherwise than in the line before.
+    changes: bool,
+    before: Map<String, Value>,
 }
 
 impl Protocol2 {
@@ -72,6 +76,7 @@ impl Protocol2 {
             client,
             token: None,
             has_place: true,
+            role: Role::SetUp,
             subscription: None,
         }
     }
@@ -83,6 +88,7 @@ impl Protocol2 {
             "machine": self.desk.machine.name,
             "client": self.client,
             "state": self.desk.state().name(),
+            "role": self.role.name(),
         } });
         format!("{greeting}\n")
     }
@@ -129,7 +135,17 @@ impl Protocol2 {
         now: Instant,
     ) -> Option<Result<Value, String>> {
         let is_stop = asked.request == "jog" && asked.with.contains_key("stop");
-        if !FREE.contains(&asked.request.as_str()) && !is_stop && !lease.is_held_by(self.client) {
+        let name = if is_stop { "jog-stop" } else { &asked.request };
+        let needs_lease = word_of(name).is_some_and(|word| word.lease);
+        if let Some(word) = word_of(name).filter(|word| word.role > self.role) {
+            return Some(Err(format!(
+                "{} may only be asked by who may {}; this client may {}",
+                asked.request,
+                word.role.name(),
+                self.role.name()
+            )));
+        }
+        if needs_lease && !lease.is_held_by(self.client) {
             let holder = lease
                 .holder()
                 .map_or("nobody holds it".to_string(), |client| {
@@ -154,7 +170,7 @@ impl Protocol2 {
     }
 
     fn lease(&self, asked: &Asked, lease: &mut Lease, now: Instant) -> Result<Value, String> {
-        asked.only(&["how"])?;
+        check(asked)?;
         match asked.text("how")? {
             "take" => lease.take(self.client, now).map_err(|holder| {
                 format!("client {holder} holds it and is asked whether it is there; \"take-over\" takes it now")
@@ -168,7 +184,7 @@ impl Protocol2 {
     }
 
     fn subscribe(&mut self, asked: &Asked, now: Instant) -> Result<Value, String> {
-        asked.only(&["rate_hz"])?;
+        check(asked)?;
         let rate_hz = asked.number("rate_hz")?;
         if rate_hz != 0.0 && !RATES_HZ.contains(&rate_hz) {
             return Err(format!(
@@ -177,8 +193,40 @@ impl Protocol2 {
                 RATES_HZ.end()
             ));
         }
-        self.subscription = (rate_hz != 0.0).then(|| (Duration::from_secs_f64(1.0 / rate_hz), now));
+        let fields: Vec<String> = asked
+            .texts("fields")
+            .iter()
+            .map(ToString::to_string)
+            .collect();
+        let status = self.desk.status();
+        if let Some(none) = fields.iter().find(|field| status.get(field).is_none()) {
+            return Err(format!("the status has no field \"{none}\""));
+        }
+        self.subscription = (rate_hz != 0.0).then(|| Subscription {
+            every: Duration::from_secs_f64(1.0 / rate_hz),
+            due: now,
+            fields,
+            changes: asked.is_on("changes"),
+            before: Map::new(),
+        });
         Ok(json!({ "rate_hz": rate_hz }))
+    }
+}
+
+impl Subscription {
+    /// What of `status` is told now.
+    fn pick(&mut self, status: Value) -> Value {
+        let Value::Object(mut all) = status else {
+            return status;
+        };
+        if !self.fields.is_empty() {
+            all.retain(|name, _| self.fields.contains(name));
+        }
+        if self.changes {
+            let before = std::mem::replace(&mut self.before, all.clone());
+            all.retain(|name, value| before.get(name) != Some(value));
+        }
+        Value::Object(all)
     }
 }
 
@@ -241,22 +289,27 @@ impl Talk for Protocol2 {
     }
 
     fn is_due(&mut self, now: Instant) -> bool {
-        let Some((every, due)) = self.subscription.as_mut().filter(|(_, due)| *due <= now) else {
+        let Some(due) = self.subscription.as_mut().filter(|of| of.due <= now) else {
             return false;
         };
         // After a stall the rate starts anew: what was missed is not made up for.
-        *due = (*due + *every).max(now);
+        due.due = (due.due + due.every).max(now);
         true
     }
 
     fn due(&self) -> Option<Instant> {
-        self.subscription.map(|(_, due)| due)
+        self.subscription.as_ref().map(|of| of.due)
     }
 
-    fn telemetry(&self, lost: u64) -> String {
+    fn telemetry(&mut self, lost: u64) -> String {
+        let status = self.desk.status();
+        let told = match &mut self.subscription {
+            Some(of) => of.pick(status),
+            None => status,
+        };
         format!(
             "{}\n",
-            json!({ "event": "status", "lost": lost, "status": self.desk.status() })
+            json!({ "event": "status", "lost": lost, "status": told })
         )
     }
 
@@ -267,11 +320,31 @@ impl Talk for Protocol2 {
         )
     }
 
+    fn frame(&self, lost: u64, frame: &str) -> String {
+        frame_line(lost, frame)
+    }
+
     fn tell_of_lease(&self, news: News) -> String {
         let words = match news {
             News::AskedBy(client) => json!({ "event": "lease", "asked_by": client }),
             News::LostTo(client) => json!({ "event": "lease", "lost_to": client }),
         };
         format!("{words}\n")
+    }
+}
+
+/// Whether the keys of a request are as its table says.
+fn check(asked: &Asked) -> Result<(), String> {
+    word_of(&asked.request).map_or(Ok(()), |word| word.check(&asked.with))
+}
+
+/// A frame of the scope as a line, behind so many that were lost.
+pub fn frame_line(lost: u64, frame: &str) -> String {
+    format!("{{\"event\":\"scope\",\"lost\":{lost},{frame}\n")
+}
+
+impl Drop for Protocol2 {
+    fn drop(&mut self) {
+        self.desk.forget(self.client);
     }
 }

@@ -193,6 +193,14 @@ impl Client {
         self.send(now);
     }
 
+    /// A frame of a stream that it has asked for; lost where it does not keep up.
+    pub fn show(&mut self, frame: &str, now: Instant) {
+        if self.phase == Phase::Talking {
+            self.outbox.frame(|lost| self.session.frame(lost, frame));
+            self.send(now);
+        }
+    }
+
     fn read(&mut self, lease: &mut Lease, now: Instant) {
         let mut chunk = [0; CHUNK];
         // One chunk a round: a client that never stops sending does not keep the others waiting.

@@ -33,9 +33,13 @@ pub trait Talk: Send {
     /// When the next status line is due.
     fn due(&self) -> Option<Instant>;
     /// A status line that was subscribed to; so many were lost before it.
-    fn telemetry(&self, lost: u64) -> String;
+    fn telemetry(&mut self, lost: u64) -> String;
     /// The last line.
     fn ended(&self, lost: u64) -> String;
+    /// A frame of a stream that the client has asked for; so many were lost before it.
+    fn frame(&self, _lost: u64, frame: &str) -> String {
+        frame.to_string()
+    }
     /// The lease was asked for, or lost.
     fn tell_of_lease(&self, news: super::lease::News) -> String {
         reply::lease(news)
@@ -50,6 +54,10 @@ pub trait House: Send + Sync {
     fn set_clients(&self, count: usize);
     /// Lines for a client, or for all, that nobody has asked for in this moment.
     fn post(&self) -> Vec<(Option<u64>, String)> {
+        vec![]
+    }
+    /// Frames of streams: a client that does not keep up loses some, and is told how many.
+    fn frames(&self) -> Vec<(u64, String)> {
         vec![]
     }
     /// Becomes readable when there is post.
@@ -120,7 +128,7 @@ impl Talk for Protocol1 {
         self.session.due()
     }
 
-    fn telemetry(&self, lost: u64) -> String {
+    fn telemetry(&mut self, lost: u64) -> String {
         reply::telemetry(&self.hub.status(), lost)
     }
 

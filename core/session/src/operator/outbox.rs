@@ -5,7 +5,9 @@ use std::io::{self, ErrorKind, Write};
 /// Telemetry is kept only while less than this waits, bytes.
 const TELEMETRY_BYTES: usize = 8 * 1024;
 /// A client that lets this much wait is closed: it asks and does not read, bytes.
-const MAX_BYTES: usize = 64 * 1024;
+const MAX_BYTES: usize = 256 * 1024;
+/// Frames of a stream are kept only while less than this waits, bytes.
+const FRAME_BYTES: usize = 64 * 1024;
 
 /// Lines on their way to a client.
 #[derive(Debug, Default)]
@@ -13,6 +15,8 @@ pub struct Outbox {
     bytes: Vec<u8>,
     /// Telemetry lines that found no room since the last one that did.
     lost: u64,
+    /// The same of frames of a stream.
+    lost_frames: u64,
 }
 
 impl Outbox {
@@ -34,6 +38,17 @@ impl Outbox {
         }
         self.bytes.extend_from_slice(line(self.lost).as_bytes());
         self.lost = 0;
+    }
+
+    /// A frame of a stream, made from the number of those lost before it; counted where there is no room for it.
+    pub fn frame(&mut self, line: impl FnOnce(u64) -> String) {
+        if self.bytes.len() >= FRAME_BYTES {
+            self.lost_frames += 1;
+            return;
+        }
+        self.bytes
+            .extend_from_slice(line(self.lost_frames).as_bytes());
+        self.lost_frames = 0;
     }
 
     /// The last telemetry line: it takes its place where an answer would.
@@ -97,7 +112,7 @@ mod tests {
     fn answers_without_end_do_not_fit() {
         let mut outbox = Outbox::default();
         let line = "x".repeat(1000);
-        assert!((0..65).all(|_| outbox.answer(&line)));
+        assert!((0..MAX_BYTES / 1000).all(|_| outbox.answer(&line)));
         assert!(!outbox.answer(&line));
     }
 }

@@ -144,6 +144,7 @@ impl Room {
             }
         }
         self.deliver(now);
+        self.show_frames(now);
         self.clients.retain(|client| !client.is_gone());
         self.house.set_clients(
             self.clients
@@ -167,6 +168,15 @@ impl Room {
                 .iter_mut()
                 .filter(for_it)
                 .for_each(|client| client.tell(&line, now));
+        }
+    }
+
+    /// Hands out frames of streams.
+    fn show_frames(&mut self, now: Instant) {
+        for (to, frame) in self.house.frames() {
+            if let Some(client) = self.clients.iter_mut().find(|client| client.number() == to) {
+                client.show(&frame, now);
+            }
         }
     }
 

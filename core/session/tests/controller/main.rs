@@ -1,153 +1,15 @@
 //! A controller on the virtual clock: what clients ask by ticks, and what they are told.
 
-use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex};
+mod page;
+mod seeing;
+mod support;
 
 use serde_json::{Value, json};
-use tandem_gcode::{Lasting, Program};
-use tandem_host::{Clock, Registry, Run, Switches};
-use tandem_machine::Machine;
-use tandem_session::controller::{
-    Controller, ControllerState, Keeper, NoKeeper, Options, ScriptLine, requests, table,
-};
-use tandem_session::operator::Listen;
+use tandem_gcode::Program;
+use tandem_host::{Clock, Run, Switches};
+use tandem_session::controller::{ControllerState, NoKeeper, requests};
 
-fn examples() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines")
-}
-
-fn machine(name: &str) -> Machine {
-    Machine::read(&examples().join(name), &[]).unwrap()
-}
-
-fn registry() -> Registry {
-    let mut registry = Registry::default();
-    for plugin in [tandem_look_ahead::PLUGIN, tandem_sim::PLUGIN] {
-        registry.register(plugin).unwrap();
-    }
-    registry
-}
-
-/// What client 1 says, by ticks, with an id each.
-#[derive(Default)]
-struct Says {
-    lines: Vec<ScriptLine>,
-    tick: u64,
-}
-
-impl Says {
-    fn new() -> Self {
-        let mut says = Self::default();
-        says.ask(100, "lease", json!({ "how": "take" }));
-        says
-    }
-
-    /// Asks `ticks` after what was asked before; the id.
-    fn ask(&mut self, ticks: u64, request: &str, mut with: Value) -> u64 {
-        self.tick += ticks;
-        let id = self.lines.len() as u64 + 1;
-        (with["id"], with["request"]) = (json!(id), json!(request));
-        self.lines.push(ScriptLine {
-            tick: self.tick,
-            client: 1,
-            line: with.to_string(),
-        });
-        id
-    }
-}
-
-/// What all clients were told.
-struct Told(Vec<Value>);
-
-impl Told {
-    fn by(
-        machine: &Machine,
-        says: Says,
-        options: impl FnOnce(&mut Options),
-        keeper: Box<dyn Keeper>,
-    ) -> Self {
-        let registry = registry();
-        let mut asked = Options {
-            clock: Clock::Virtual,
-            listen: Listen::default(),
-            programs: None,
-            enable: true,
-            script: says.lines,
-            uptime_periods: 0,
-            lasting: None,
-        };
-        options(&mut asked);
-        let controller = Controller::open(machine, &registry, asked, keeper).unwrap();
-        let mut told = vec![];
-        controller
-            .run(&mut |line| told.extend(serde_json::from_str(line).ok()))
-            .unwrap();
-        Self(told)
-    }
-
-    /// The one answer to the request `id`.
-    fn answer(&self, id: u64) -> &Value {
-        let is_answer =
-            |told: &&Value| told["told"]["id"] == id && told["told"].get("event").is_none();
-        let answers: Vec<_> = self.0.iter().filter(is_answer).collect();
-        assert_eq!(
-            answers.len(),
-            1,
-            "every request has one answer: {id} {answers:?}"
-        );
-        &answers[0]["told"]
-    }
-
-    fn ok(&self, id: u64) -> &Value {
-        let answer = self.answer(id);
-        assert!(answer.get("ok").is_some(), "{answer}");
-        &answer["ok"]
-    }
-
-    fn why(&self, id: u64) -> &str {
-        self.answer(id)["error"]["why"]
-            .as_str()
-            .unwrap_or_else(|| panic!("{}", self.answer(id)))
-    }
-
-    fn jobs(&self) -> Vec<(String, String)> {
-        let events = self.0.iter().filter(|told| told["told"]["event"] == "job");
-        let word = |job: &Value, key: &str| job[key].as_str().unwrap().to_string();
-        events
-            .map(|told| {
-                (
-                    word(&told["told"]["job"], "job"),
-                    word(&told["told"]["job"], "outcome"),
-                )
-            })
-            .collect()
-    }
-
-    fn states(&self) -> Vec<&str> {
-        let events = self
-            .0
-            .iter()
-            .filter(|told| told["told"]["event"] == "state");
-        events
-            .map(|told| told["told"]["state"].as_str().unwrap())
-            .collect()
-    }
-}
-
-/// Keeps what it is given.
-#[derive(Clone, Default)]
-struct Kept(Arc<Mutex<Vec<Lasting>>>);
-
-impl Keeper for Kept {
-    fn commit(&self, lasting: &Lasting) -> Result<(), String> {
-        self.record(lasting);
-        Ok(())
-    }
-
-    fn record(&self, lasting: &Lasting) {
-        self.0.lock().unwrap().push(lasting.clone());
-    }
-}
+use support::{Kept, Says, Told, machine, registry};
 
 const PART: &str = "G21 G90 G54 F1200\n#100 = 1\nM3 S1000\nG1 X40\nG91 #100 = 2\nG1 Y30\nG10 L2 P2 X77\nG1 X-40\nG1 Y-30\nM2\n";
 
@@ -428,15 +290,4 @@ fn every_request_has_one_answer_in_real_states() {
         };
         assert_eq!(told.ok(end)["state"], state.name());
     }
-}
-
-#[test]
-fn the_page_prints_the_table() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/controller.md");
-    let page = std::fs::read_to_string(path).unwrap();
-    assert!(
-        page.contains(table().trim_end()),
-        "docs/controller.md is to have:\n{}",
-        table()
-    );
 }

@@ -1,0 +1,264 @@
+//! Who sees what a job does, and the clients of a replay.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
+use std::sync::atomic::Ordering::Relaxed;
+use std::time::Instant;
+
+use serde_json::{Value, json};
+use tandem_gcode::Item;
+use tandem_host::{Clock, RunObserver, StopAnswer};
+use tandem_rings::{Rest, Sample};
+use tandem_rough::Source;
+use tandem_sdk::{AxisVector, Block, BlockReport, Curve};
+
+use super::desk::{Desk, Mode};
+use super::lines::lock;
+use super::serve::{ScriptLine, Tell};
+use super::talk::Protocol2;
+use crate::operator::{Lease, Talk};
+use crate::standing::Standing;
+
+/// Lines of clients by fine periods, on the virtual clock.
+#[derive(Default)]
+pub struct Script {
+    pub lines: VecDeque<ScriptLine>,
+    clients: BTreeMap<u64, Protocol2>,
+    lease: Lease,
+}
+
+impl Script {
+    /// What they say, in the order of the fine periods.
+    pub fn of(lines: Vec<ScriptLine>) -> Self {
+        Self {
+            lines: lines.into(),
+            ..Self::default()
+        }
+    }
+
+    fn say_due(&mut self, desk: &Arc<Desk>, tick: u64, tell: Tell<'_>) {
+        while self.lines.front().is_some_and(|line| line.tick <= tick) {
+            let Some(ScriptLine { client, line, .. }) = self.lines.pop_front() else {
+                return;
+            };
+            let talk = self
+                .clients
+                .entry(client)
+                .or_insert_with(|| Protocol2::known(Arc::clone(desk), client));
+            // Subscriptions live in real time, and are not for replays.
+            let answer = talk.line(&line, &mut self.lease, Instant::now());
+            Self::print(tick, Some(client), &answer.line, tell);
+        }
+    }
+
+    fn print(tick: u64, client: Option<u64>, line: &str, tell: Tell<'_>) {
+        if let Ok(told) = serde_json::from_str::<Value>(line) {
+            tell(&json!({ "tick": tick, "client": client, "told": told }).to_string());
+        }
+    }
+
+    pub fn flush(desk: &Desk, tick: u64, clock: Clock, tell: Tell<'_>) {
+        if clock == Clock::Virtual {
+            for (client, line) in desk.take_post() {
+                Self::print(tick, client, &line, tell);
+            }
+            for (client, frame) in desk.take_frames() {
+                Self::print(
+                    tick,
+                    Some(client),
+                    &super::talk::frame_line(0, &frame),
+                    tell,
+                );
+            }
+        }
+    }
+}
+
+/// Takes notes only.
+pub struct Notes<'a>(pub Tell<'a>);
+
+impl RunObserver for Notes<'_> {
+    fn note(&mut self, note: &str) {
+        (self.0)(note);
+    }
+}
+
+/// Sees what a job does, for the desk; in lockstep it says what the script says.
+pub struct Watch<'a> {
+    desk: &'a Arc<Desk>,
+    script: &'a mut Script,
+    tell: Tell<'a>,
+    mode: Mode,
+    clock: Clock,
+    length_mm: f64,
+    driven_mm: f64,
+    block: Option<u64>,
+    /// Ends of the blocks that are planned and not driven.
+    ends_of: VecDeque<(u64, AxisVector)>,
+    /// Where the last sample was, for those who draw the path.
+    place: Option<AxisVector>,
+    tick: u64,
+    ends: bool,
+}
+
+impl<'a> Watch<'a> {
+    pub fn new(
+        desk: &'a Arc<Desk>,
+        script: &'a mut Script,
+        tell: Tell<'a>,
+        mode: Mode,
+        clock: Clock,
+        length_mm: f64,
+    ) -> Self {
+        Self {
+            desk,
+            script,
+            tell,
+            mode,
+            clock,
+            length_mm,
+            driven_mm: 0.0,
+            block: None,
+            ends_of: VecDeque::new(),
+            place: None,
+            tick: 0,
+            ends: false,
+        }
+    }
+}
+
+impl RunObserver for Watch<'_> {
+    fn note(&mut self, note: &str) {
+        (self.tell)(note);
+    }
+
+    fn program_stop(&mut self, line: u32) -> StopAnswer {
+        let hub = &self.desk.hub;
+        if hub.waits_on_line().is_none() {
+            hub.begin_wait(line);
+            self.desk
+                .send(None, &json!({ "event": "waits", "line": line }));
+            return StopAnswer::Wait;
+        }
+        if hub.answered() {
+            StopAnswer::GoOn
+        } else {
+            StopAnswer::Wait
+        }
+    }
+
+    fn is_attended(&self) -> bool {
+        self.clock == Clock::Wall || !self.script.lines.is_empty()
+    }
+
+    fn rest(&mut self, _rest: &Rest) {
+        self.desk.hub.end_wait();
+    }
+
+    fn block(&mut self, block: &Block, curve: Option<Curve<'_>>, _report: &BlockReport) {
+        self.ends_of.push_back((block.index, block.end));
+        if self.mode != Mode::Program {
+            self.desk.path().block(block, curve);
+        }
+    }
+
+    fn sample(&mut self, sample: &Sample, _deviation_mm: f64, signals: &[f64]) {
+        self.driven_mm += sample.feed_mm_per_s * self.desk.machine.fine_period_s;
+        let share = if self.length_mm > 0.0 {
+            (self.driven_mm / self.length_mm).min(1.0)
+        } else {
+            0.0
+        };
+        self.desk.hub.sample(sample, share);
+        self.desk.scope().sample(sample, signals);
+        self.place = Some(sample.command);
+        let is_next = self.block != Some(sample.block);
+        if is_next {
+            while self
+                .ends_of
+                .front()
+                .is_some_and(|(at, _)| *at < sample.block)
+            {
+                self.ends_of.pop_front();
+            }
+        }
+        let mut seen = self.desk.seen();
+        if is_next {
+            let end = self.ends_of.front().filter(|(at, _)| *at == sample.block);
+            (seen.block, seen.end) = (sample.block, end.map(|(_, end)| *end));
+        }
+        seen.switched = sample.switched;
+        drop(seen);
+        if is_next && matches!(self.mode, Mode::Program | Mode::Mdi) {
+            let driven = lock(&self.desk.lines).reach(sample.block);
+            self.desk.tell_driven(&driven, true);
+        }
+        self.block = Some(sample.block);
+    }
+
+    fn period(&mut self) {
+        if self.desk.is_over() && !self.ends && self.mode != Mode::Idle {
+            self.ends = true;
+            self.desk.hub.controls().abort.store(true, Relaxed);
+        }
+        if let Some(place) = self.place.take() {
+            self.desk.path().drive(&place);
+        }
+        self.desk.send_scope(false);
+        self.desk.tell_state();
+        Script::flush(self.desk, self.tick, self.clock, self.tell);
+    }
+
+    fn before_tick(&mut self, uptime_periods: u64) {
+        self.tick = uptime_periods;
+        self.script.say_due(self.desk, uptime_periods, self.tell);
+    }
+}
+
+/// The jogs that wait, as the rough loop pulls them, until none does.
+pub struct Jogs {
+    desk: Arc<Desk>,
+    standing: Standing,
+}
+
+impl Jogs {
+    /// Those that wait at the desk.
+    pub fn new(desk: Arc<Desk>) -> Self {
+        Self {
+            desk,
+            standing: Standing::default(),
+        }
+    }
+}
+
+impl Source for Jogs {
+    fn may_go_on(&mut self, driven: bool) -> bool {
+        self.standing.look(driven);
+        if self.standing.is_still() {
+            let _ = self.desk.jogs.arrived();
+        }
+        self.standing.is_still()
+    }
+
+    fn next_items(&mut self, items: &mut Vec<Item>) -> Result<bool, String> {
+        let (_, refused) = self.desk.jogs.next(items);
+        for why in refused {
+            self.desk.send(
+                None,
+                &json!({ "event": "refused", "job": "jogging", "why": why }),
+            );
+        }
+        if !items.is_empty() {
+            self.standing.moves();
+        }
+        Ok(!items.is_empty() || !self.desk.jogs.is_still())
+    }
+
+    fn provide_input(&mut self, _value: f64) {}
+
+    fn provide_rest(&mut self, rest: &Rest) -> bool {
+        self.standing.moves();
+        let _ = self.desk.jogs.rests(rest);
+        true
+    }
+}

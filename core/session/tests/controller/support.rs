@@ -1,0 +1,154 @@
+//! Clients of a controller by fine periods, and what they were told.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
+
+use serde_json::{Value, json};
+use tandem_gcode::Lasting;
+use tandem_host::{Clock, Registry};
+use tandem_machine::Machine;
+use tandem_session::controller::{Controller, Keeper, Options, ScriptLine};
+use tandem_session::operator::Listen;
+
+pub fn examples() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines")
+}
+
+pub fn machine(name: &str) -> Machine {
+    Machine::read(&examples().join(name), &[]).unwrap()
+}
+
+pub fn registry() -> Registry {
+    let mut registry = Registry::default();
+    for plugin in [tandem_look_ahead::PLUGIN, tandem_sim::PLUGIN] {
+        registry.register(plugin).unwrap();
+    }
+    registry
+}
+
+/// What client 1 says, by ticks, with an id each.
+#[derive(Default)]
+pub struct Says {
+    pub lines: Vec<ScriptLine>,
+    pub tick: u64,
+}
+
+impl Says {
+    pub fn new() -> Self {
+        let mut says = Self::default();
+        says.ask(100, "lease", json!({ "how": "take" }));
+        says
+    }
+
+    /// Asks `ticks` after what was asked before; the id.
+    pub fn ask(&mut self, ticks: u64, request: &str, mut with: Value) -> u64 {
+        self.tick += ticks;
+        let id = self.lines.len() as u64 + 1;
+        (with["id"], with["request"]) = (json!(id), json!(request));
+        self.lines.push(ScriptLine {
+            tick: self.tick,
+            client: 1,
+            line: with.to_string(),
+        });
+        id
+    }
+}
+
+/// What all clients were told.
+pub struct Told(pub Vec<Value>);
+
+impl Told {
+    pub fn by(
+        machine: &Machine,
+        says: Says,
+        options: impl FnOnce(&mut Options),
+        keeper: Box<dyn Keeper>,
+    ) -> Self {
+        let registry = registry();
+        let mut asked = Options {
+            clock: Clock::Virtual,
+            listen: Listen::default(),
+            programs: None,
+            enable: true,
+            script: says.lines,
+            uptime_periods: 0,
+            lasting: None,
+        };
+        options(&mut asked);
+        let controller = Controller::open(machine, &registry, asked, keeper).unwrap();
+        let mut told = vec![];
+        controller
+            .run(&mut |line| told.extend(serde_json::from_str(line).ok()))
+            .unwrap();
+        Self(told)
+    }
+
+    /// The one answer to the request `id`.
+    pub fn answer(&self, id: u64) -> &Value {
+        let is_answer =
+            |told: &&Value| told["told"]["id"] == id && told["told"].get("event").is_none();
+        let answers: Vec<_> = self.0.iter().filter(is_answer).collect();
+        assert_eq!(
+            answers.len(),
+            1,
+            "every request has one answer: {id} {answers:?}"
+        );
+        &answers[0]["told"]
+    }
+
+    pub fn ok(&self, id: u64) -> &Value {
+        let answer = self.answer(id);
+        assert!(answer.get("ok").is_some(), "{answer}");
+        &answer["ok"]
+    }
+
+    pub fn why(&self, id: u64) -> &str {
+        self.answer(id)["error"]["why"]
+            .as_str()
+            .unwrap_or_else(|| panic!("{}", self.answer(id)))
+    }
+
+    pub fn jobs(&self) -> Vec<(String, String)> {
+        let events = self.0.iter().filter(|told| told["told"]["event"] == "job");
+        let word = |job: &Value, key: &str| job[key].as_str().unwrap().to_string();
+        events
+            .map(|told| {
+                (
+                    word(&told["told"]["job"], "job"),
+                    word(&told["told"]["job"], "outcome"),
+                )
+            })
+            .collect()
+    }
+
+    /// The events of this name, in order.
+    pub fn events(&self, name: &str) -> Vec<&Value> {
+        let told = self.0.iter().map(|told| &told["told"]);
+        told.filter(|told| told["event"] == name).collect()
+    }
+
+    pub fn states(&self) -> Vec<&str> {
+        let events = self
+            .0
+            .iter()
+            .filter(|told| told["told"]["event"] == "state");
+        events
+            .map(|told| told["told"]["state"].as_str().unwrap())
+            .collect()
+    }
+}
+
+/// Keeps what it is given.
+#[derive(Clone, Default)]
+pub struct Kept(pub Arc<Mutex<Vec<Lasting>>>);
+
+impl Keeper for Kept {
+    fn commit(&self, lasting: &Lasting) -> Result<(), String> {
+        self.record(lasting);
+        Ok(())
+    }
+
+    fn record(&self, lasting: &Lasting) {
+        self.0.lock().unwrap().push(lasting.clone());
+    }
+}
