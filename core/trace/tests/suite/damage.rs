@@ -173,7 +173,7 @@ fn other_files_are_refused_with_the_cause() {
     bytes[MAGIC.len()] = 9;
     assert_eq!(
         refused(&bytes),
-        "byte 8: the trace has format 9, this program reads formats 1 to 3"
+        "byte 8: the trace has format 9, this program reads formats 1 to 4"
     );
     bytes[MAGIC.len()] = 1;
     bytes[20] ^= 1;
