@@ -26,12 +26,26 @@ pub enum LawName {
     Ratio,
 }
 
+/// What is done with the torque.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Mode {
+    /// The feed follows it.
+    #[default]
+    Control,
+    /// It is told and nothing else: the ratio is 1 and no guard holds.
+    Observe,
+}
+
 tandem_sdk::options! {
     /// The keys of `[feed_strategy.options]`.
     pub struct Options {
+        /// What is done with the torque: `control` sets the feed by it, `observe` tells it as a signal and does nothing else;
+        /// then reference, feeds and `stability` may be left out.
+        pub mode: Mode = Mode::Control,
         /// The law: `pi` and `ratio` hold the reference, `p` is the published one and leaves an offset.
         pub law: LawName = LawName::Pi,
-        /// Torque to be held, N·m at the motor of the first axis listed; required.
+        /// Torque to be held, N·m at the motor of the first axis listed; required but in mode `observe`.
         pub reference_torque_nm: Option<f64> = None,
         /// Gain of `p` and `pi`, (mm/min)/(N·m); 1500 and 1000 where left out.
         pub gain_mm_per_min_per_nm: Option<f64> = None,
@@ -154,11 +168,18 @@ impl Options {
                  where each axis has one motor of its own",
             ));
         }
-        self.check_values(context)?;
-        self.check_stability(context)
+        if self.mode == Mode::Control {
+            self.check_control()?;
+        }
+        self.check_estimate(context)?;
+        match self.mode {
+            Mode::Control => self.check_stability(context),
+            Mode::Observe => Ok(()),
+        }
     }
 
-    fn check_values(&self, context: &StrategyContext) -> Result<(), PluginError> {
+    /// What the law and the guard need.
+    fn check_control(&self) -> Result<(), PluginError> {
         let reference_nm = stated("reference_torque_nm", self.reference_torque_nm, 1e-6, 1e4)?;
         within(
             "gain_mm_per_min_per_nm",
@@ -193,6 +214,11 @@ impl Options {
         }
         within("guard_torque_nm", self.guard_torque_nm(), reference_nm, 1e6)?;
         within("guard_samples", f64::from(self.guard_samples), 1.0, 1e6)?;
+        self.stability.check()
+    }
+
+    /// What the estimate of the torque needs.
+    fn check_estimate(&self, context: &StrategyContext) -> Result<(), PluginError> {
         within(
             "observer_time_constant_ms",
             self.observer_time_constant_ms,
@@ -205,13 +231,12 @@ impl Options {
         }
         self.axes
             .iter()
-            .try_for_each(|(letter, axis)| axis.check(letter, context))?;
-        self.stability.check()
+            .try_for_each(|(letter, axis)| axis.check(letter, context))
     }
 
-    /// Torque to be held, N·m; of checked options.
+    /// Torque to be held, N·m; of checked options. Zero where it is only observed and none is stated.
     pub fn reference_nm(&self) -> f64 {
-        self.reference_torque_nm.unwrap_or(f64::NAN)
+        self.reference_torque_nm.unwrap_or(0.0)
     }
 
     /// Mean torque below which the tool is in air, N·m.

@@ -11,7 +11,7 @@ use crate::engagement::{Engagement, Tool};
 use crate::guard::Guard;
 use crate::law::{FeedLaw, RateLimit};
 use crate::mean::window;
-use crate::options::Options;
+use crate::options::{Mode, Options};
 
 /// Names of the signals, in the order of [`Answer::signals`].
 const SIGNALS: [&str; 6] = [
@@ -215,8 +215,31 @@ impl ForceControl {
         }
     }
 
+    /// The torque as signals, and a ratio of 1: what is asked for is the programmed feed.
+    fn observed(&mut self, motion: &Motion, torque_nm: f64) -> Answer {
+        self.engagement
+            .update(motion.feed_mm_per_s > 0.0, torque_nm);
+        Answer::of_ratio(1.0).with_signals(&[
+            torque_nm,
+            self.options.reference_nm(),
+            self.force_n(torque_nm),
+            self.programmed_mm_per_s * 60.0,
+            1.0,
+            self.engagement.tool.number(),
+        ])
+    }
+
+    /// The cutting force in the direction of the first axis, N.
+    fn force_n(&self, torque_nm: f64) -> f64 {
+        let first = self.axes.first();
+        first.map_or(0.0, |axis| axis.force_per_torque_per_m) * torque_nm
+    }
+
     fn answer(&mut self, motion: &Motion) -> Answer {
         let torque_nm = self.mean_nm(motion.spindle_rad_per_s);
+        if self.options.mode == Mode::Observe {
+            return self.observed(motion, torque_nm);
+        }
         let target = self.target(motion, torque_nm);
         let bounds = self.options.bounds();
         let feed = self
@@ -229,11 +252,7 @@ impl ForceControl {
             1.0
         };
         self.asked_mm_per_s = [feed, self.asked_mm_per_s[0], self.asked_mm_per_s[1]];
-        let force_n = self
-            .axes
-            .first()
-            .map_or(0.0, |axis| axis.force_per_torque_per_m)
-            * torque_nm;
+        let force_n = self.force_n(torque_nm);
         let tool = if motion.tripped {
             TRIPPED
         } else {
