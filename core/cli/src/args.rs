@@ -200,6 +200,18 @@ pub struct Serve {
     /// The folder of the programs that clients may load by their path
     #[arg(long, value_name = "FOLDER")]
     pub programs: Option<PathBuf>,
+    /// Serve the operator's page to browsers on this computer; the address that is printed opens it
+    #[cfg(feature = "web")]
+    #[arg(long, value_name = "127.0.0.1:PORT")]
+    pub http: Option<SocketAddr>,
+    /// The file of the token that opens the page, made where it does not exist; without it a token is good for this process
+    #[cfg(feature = "web")]
+    #[arg(long, value_name = "F", requires = "http")]
+    pub http_token_file: Option<PathBuf>,
+    /// A name, with a port where it is another one, by which browsers ask for the page through a proxy of yours
+    #[cfg(feature = "web")]
+    #[arg(long, value_name = "NAME", requires = "http")]
+    pub http_host: Vec<String>,
     /// Enable real drives at once; simulated ones are enabled without it
     #[arg(long)]
     pub enable: bool,

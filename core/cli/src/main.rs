@@ -45,6 +45,8 @@ mod state;
 mod tolerances;
 mod trace;
 mod warnings;
+#[cfg(feature = "web")]
+mod web;
 
 use std::process::ExitCode;
 

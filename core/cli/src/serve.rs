@@ -62,6 +62,8 @@ pub fn serve(options: &args::Serve) -> Result<u8, Box<dyn Error>> {
     let enabled = asked.enable;
     let controller = Controller::open(&machine, &registry, asked, keeper)?;
     end_by_signals(controller.ender())?;
+    #[cfg(feature = "web")]
+    let page = crate::web::open(options, &listen)?;
     if !replays {
         explain(
             &machine,
@@ -70,6 +72,10 @@ pub fn serve(options: &args::Serve) -> Result<u8, Box<dyn Error>> {
             kept_in.as_deref(),
             enabled,
         );
+        #[cfg(feature = "web")]
+        if let Some(page) = &page {
+            say!("the operator's page: {}", page.link);
+        }
         notify("READY=1");
     }
     let mut out = io::stdout().lock();
@@ -82,6 +88,8 @@ pub fn serve(options: &args::Serve) -> Result<u8, Box<dyn Error>> {
         };
     })?;
     notify("STOPPING=1");
+    #[cfg(feature = "web")]
+    drop(page);
     Ok(0)
 }
 

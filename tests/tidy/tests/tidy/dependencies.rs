@@ -11,6 +11,7 @@ use crate::tree::{File, files};
 const ALLOWED: &[(&str, &[&str])] = &[
     ("core/sdk", &[]),
     ("core/report", &[]),
+    ("core/web", &[]),
     ("core/motion", &["tandem-sdk"]),
     ("core/gcode", &["tandem-motion", "tandem-sdk"]),
     ("core/policy", &["tandem-motion", "tandem-sdk"]),

@@ -1,0 +1,97 @@
+// Work offsets with touch-off, tools, and what was driven.
+import { bind, machine } from "./machine.js";
+import { element, fixed, say } from "./words.js";
+
+const read = async (fill) => {
+  try { fill(await machine.link.ask("tables")); } catch (error) { say(error.message); }
+};
+
+export function offsetsPanel() {
+  const touch = element("div", { class: "group" });
+  const table = element("table");
+  let system = null;
+  const fill = ({ offsets }) => {
+    const axes = machine.described.axes;
+    const active = machine.status ? machine.status.system : "";
+    const head = element("thead", {}, element("tr", {}, ...["", ...axes.map((axis) => axis.axis.toUpperCase())].map((name) => element("th", {}, name))));
+    const rows = Object.entries(offsets).map(([name, origin]) => element("tr", { class: name === active ? "active" : null },
+      element("td", {}, name), ...axes.map((axis) => element("td", {}, fixed(origin[machine.key(axis)])))));
+    table.replaceChildren(head, element("tbody", {}, ...rows));
+  };
+  const set = async (keys) => { if (await machine.ask("touch-off", keys)) read(fill); };
+  machine.on("described", ({ axes }) => {
+    const inputs = axes.map((axis) => {
+      const input = element("input", { type: "number", step: "any", value: "0", "aria-label": `${axis.axis.toUpperCase()} is`, style: "width: 90px" });
+      const button = bind(element("button", {}, `Set ${axis.axis.toUpperCase()}`), "touch-off", () => set({ [machine.key(axis)]: Number(input.value) }));
+      return element("div", { class: "row" }, element("b", { style: `color: var(--${axis.axis}, var(--ink)); width: 22px` }, axis.axis.toUpperCase()), element("i", {}, "is"), input, element("small", {}, axis.unit), button);
+    });
+    const zero = bind(element("button", {}, "All are zero here"), "touch-off", () => set(Object.fromEntries(axes.map((axis) => [machine.key(axis), 0]))));
+    touch.replaceChildren(...inputs, zero);
+    read(fill);
+  });
+  machine.on("status", (status) => {
+    if (status && status.system !== system) { system = status.system; read(fill); }
+  });
+  machine.link.on("job", () => read(fill));
+  return element("div", {}, element("h2", {}, "Touch off: where the machine stands is called"), touch,
+    element("h2", {}, "Origins, machine coordinates"), element("div", { class: "wide" }, table));
+}
+
+export function toolsPanel() {
+  const table = element("table");
+  const number = element("input", { type: "number", min: "1", step: "1", "aria-label": "Tool number", placeholder: "T" });
+  const length = element("input", { type: "number", step: "any", "aria-label": "Length offset in mm", placeholder: "length mm" });
+  const diameter = element("input", { type: "number", step: "any", "aria-label": "Diameter in mm", placeholder: "⌀ mm" });
+  const fill = ({ tools }) => {
+    const inSpindle = machine.status ? machine.status.tool : 0;
+    const row = (tool) => {
+      const load = bind(element("button", {}, tool.number === inSpindle ? "in spindle" : "insert"), "set-tool", async () => {
+        if (await machine.ask("set-tool", { number: tool.number, in_spindle: true })) read(fill);
+      });
+      return element("tr", { class: tool.number === inSpindle ? "active" : null }, element("td", {}, `T${tool.number}`),
+        element("td", {}, fixed(tool.offset.z_mm)), element("td", {}, fixed(tool.diameter_mm)), element("td", {}, load));
+    };
+    const body = tools.length ? tools.map(row) : [element("tr", {}, element("td", { colspan: "4" }, "There are none yet."))];
+    table.replaceChildren(element("thead", {}, element("tr", {}, ...["", "length", "⌀", ""].map((name) => element("th", {}, name)))), element("tbody", {}, ...body));
+  };
+  const set = bind(element("button", { class: "primary" }, "Set"), "set-tool", async () => {
+    if (!number.value) { say("A tool has a number."); return; }
+    const keys = { number: Number(number.value) };
+    if (length.value) keys.z_mm = Number(length.value);
+    if (diameter.value) keys.diameter_mm = Number(diameter.value);
+    if (await machine.ask("set-tool", keys)) { number.value = length.value = diameter.value = ""; read(fill); }
+  });
+  let tool = null;
+  machine.on("described", () => read(fill));
+  machine.on("status", (status) => { if (status && status.tool !== tool) { tool = status.tool; read(fill); } });
+  return element("div", {}, element("div", { class: "wide" }, table), element("h2", {}, "A tool"),
+    element("div", { class: "row" }, number, length, diameter, set));
+}
+
+export function historyPanel() {
+  const list = element("ul", { class: "files" });
+  const alarms = element("ul", { class: "errors" });
+  const fill = async () => {
+    try {
+      const told = await machine.link.ask("history");
+      const jobs = [...told.jobs];
+      // The latest stands first, whichever way they come.
+      if (jobs.length > 1 && (jobs[0].started_ms || 0) < (jobs[jobs.length - 1].started_ms || 0)) jobs.reverse();
+      else if (jobs.length && jobs[0].started_ms === undefined) jobs.reverse();
+      list.replaceChildren(...(jobs.length ? jobs.map(job) : [element("li", { class: "hint" }, "Nothing was driven yet.")]));
+      const told_alarms = (told.alarms || []).map((alarm) => element("li", {}, alarm.fault || alarm.words || String(alarm)));
+      alarms.replaceChildren(...told_alarms.slice(-10).reverse());
+    } catch (error) { say(error.message); }
+  };
+  machine.on("described", fill);
+  machine.link.on("job", fill);
+  machine.link.on("state", fill);
+  return element("div", {}, element("h2", {}, "Jobs"), list, element("h2", {}, "Alarms"), alarms);
+}
+
+function job({ name, outcome, time_s, blocks }) {
+  const time = Number.isFinite(time_s) ? `${time_s.toFixed(1)} s` : "";
+  const words = outcome === "done" ? "" : outcome;
+  return element("li", { class: "row" }, element("span", { class: "grow" }, name), element("small", { class: outcome === "fault" ? "bad" : null }, words),
+    element("small", {}, blocks ? `${blocks} blocks` : ""), element("small", { style: "min-width: 58px; text-align: right" }, time));
+}
