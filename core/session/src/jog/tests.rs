@@ -199,3 +199,30 @@ fn a_machine_that_is_not_enabled_is_not_jogged() {
     rig.jogs.end();
     assert!(rig.on('x', false).is_err());
 }
+
+/// A beat that was on its way for too long finds the machine at rest, and it stays so.
+#[test]
+fn what_keeps_a_jog_alive_begins_none() {
+    let rig = Rig::new();
+    let words = JogMessage {
+        axis: 'x',
+        reach: ReachMessage::On { positive: true },
+        feed_per_min: 600.0,
+        degrees: None,
+    };
+    let jog = words.on(&rig.jogs.machine().axes).unwrap();
+    let beats = || rig.controls.jog.beats.load(Relaxed);
+    assert!(rig.jogs.keep_alive(jog).is_err() && rig.begins().is_none());
+    rig.on('x', true).unwrap();
+    // Also while it waits for the loop that drives.
+    rig.jogs.keep_alive(jog).unwrap();
+    assert!(rig.begins().is_some());
+    let before = beats();
+    rig.jogs.keep_alive(jog).unwrap();
+    assert_eq!(beats(), before + 1);
+    rig.jogs.let_go();
+    assert!(rig.jogs.keep_alive(jog).is_err());
+    assert!(rig.rests_at(1.0).is_some());
+    assert!(rig.jogs.keep_alive(jog).is_err() && rig.begins().is_none());
+    assert_eq!(beats(), before + 1);
+}
