@@ -7,9 +7,10 @@ mod support;
 use serde_json::{Value, json};
 use tandem_gcode::Program;
 use tandem_host::{Clock, Run, Switches};
+use tandem_machine::Machine;
 use tandem_session::controller::{ControllerState, NoKeeper, requests};
 
-use support::{Kept, Says, Told, machine, registry};
+use support::{Kept, Says, Told, examples, machine, registry};
 
 const PART: &str = "G21 G90 G54 F1200\n#100 = 1\nM3 S1000\nG1 X40\nG91 #100 = 2\nG1 Y30\nG10 L2 P2 X77\nG1 X-40\nG1 Y-30\nM2\n";
 
