@@ -305,22 +305,28 @@ fn a_trace_of_format_1_is_read() {
 
 /// What the program that wrote it exported is what this one exports: columns that it has not are not made up.
 #[test]
-fn a_trace_of_format_2_is_read_and_exported_as_it_was() {
-    let folder = tempfile::tempdir().unwrap();
-    let fixtures = root().join("tests/fixtures/traces");
-    let (old, csv) = (fixtures.join("format-2.ttr"), folder.path().join("old.csv"));
-    let (status, said, _) = trace(&["info".as_ref(), &old]);
-    assert!(
-        status == 0 && said.contains("format 2") && said.contains("complete"),
-        "{said}"
-    );
-    assert_eq!(
-        trace(&["export".as_ref(), &old, "--csv".as_ref(), &csv]).0,
-        0
-    );
-    assert_eq!(
-        std::fs::read_to_string(&csv).unwrap(),
-        std::fs::read_to_string(fixtures.join("format-2.csv")).unwrap()
-    );
-    assert_eq!(trace(&["diff".as_ref(), &old, &csv]).0, 0);
+fn traces_of_formats_2_and_3_are_read_and_exported_as_they_were() {
+    for format in [2, 3] {
+        let folder = tempfile::tempdir().unwrap();
+        let fixture = |end: &str| {
+            root()
+                .join("tests/fixtures/traces")
+                .join(format!("format-{format}.{end}"))
+        };
+        let (old, csv) = (fixture("ttr"), folder.path().join("old.csv"));
+        let (status, said, _) = trace(&["info".as_ref(), &old]);
+        assert!(
+            status == 0 && said.contains(&format!("format {format}")) && said.contains("complete"),
+            "{said}"
+        );
+        assert_eq!(
+            trace(&["export".as_ref(), &old, "--csv".as_ref(), &csv]).0,
+            0
+        );
+        assert_eq!(
+            std::fs::read_to_string(&csv).unwrap(),
+            std::fs::read_to_string(fixture("csv")).unwrap()
+        );
+        assert_eq!(trace(&["diff".as_ref(), &old, &csv]).0, 0);
+    }
 }
