@@ -5,6 +5,8 @@
 //! the emulator in this process, or at the interface that `TANDEM_BENCH_INTERFACE` names, with four drives behind it
 //! (and nothing else).
 
+#![allow(clippy::format_push_string, reason = "options in pieces, once a rig")]
+
 use std::time::{Duration, Instant};
 
 use divan::Bencher;

@@ -53,6 +53,7 @@ mod tests {
     use crate::bus::Bus;
     use crate::options::Options;
     use crate::survey::context_of;
+    use tandem_ethercat_emulator::What;
     use tandem_sdk::PluginOptions;
 
     /// Objects are read in operation within ten periods, while every exchange has its time and its reply.
@@ -91,6 +92,19 @@ mod tests {
             assert!(
                 refused.contains("device 2 (2): reading 5FFF:00: it refuses"),
                 "{refused}"
+            );
+            // A mailbox that does not answer is waited for, and the exchanges go on meanwhile.
+            let silent = What::SilentMailbox { device: 1 };
+            let wire = bus.link_mut().wire_mut().unwrap();
+            wire.inject(silent, None).unwrap();
+            let (begun, before_ns) = (bus.counters.exchanges, bus.link_mut().now_ns());
+            let refused = bus.read_object(1, 0x6502, 0).unwrap_err();
+            assert!(refused.contains("its mailbox does not answer"), "{refused}");
+            let took = bus.counters.exchanges - begun;
+            let passed = (bus.link_mut().now_ns() - before_ns) / 1_000_000;
+            assert!(
+                passed > 500 && took.abs_diff(passed) <= 1,
+                "{took} exchanges in {passed} ms"
             );
             let counters = bus.counters;
             assert_eq!((counters.lost, counters.short, counters.strays), (0, 0, 0));

@@ -659,6 +659,12 @@ mod tests {
         (*state >> 11) as f64 / (1_u64 << 53) as f64
     }
 
+    fn drive(n: usize) -> String {
+        format!(
+            "[[devices]]\nposition = {n}\nproduct = \"0x0e1a:0x0402\"\njoint = \"{n}\"\ncounts_per_mm = 1000\n"
+        )
+    }
+
     /// Two minutes on a computer that wakes up to 100 µs late, with clocks that are off by up to 100 ppm: every SYNC0 finds a new
     /// setpoint, and the frame is where it is wanted but for the jitter.
     #[test]
@@ -666,13 +672,7 @@ mod tests {
         const JITTER_NS: f64 = 100_000.0;
         for seed in [1, 2] {
             let mut random = seed;
-            let drives: String = (0..3)
-                .map(|n| {
-                    format!(
-                        "[[devices]]\nposition = {n}\nproduct = \"0x0e1a:0x0402\"\njoint = \"{n}\"\ncounts_per_mm = 1000\n"
-                    )
-                })
-                .collect();
+            let drives: String = (0..3).map(drive).collect();
             let clocks: String = [100.0, -100.0, (drawn(&mut random) - 0.5) * 200.0]
                 .map(|ppm| format!("[[emulated.devices]]\nkind = \"drive\"\ndrift_ppm = {ppm:?}\n"))
                 .concat();
