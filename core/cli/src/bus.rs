@@ -221,11 +221,10 @@ fn watch_bus(
                     .lost
                     .as_ref()
                     .map_or(String::new(), |lost| format!(", lost: {lost}"));
-                let objects: String = device
+                let objects = device
                     .objects
                     .iter()
-                    .map(|object| format!(", {object}"))
-                    .collect();
+                    .fold(String::new(), |all, object| all + ", " + object);
                 say!("{}: {}{status}{lost}{objects}", device.called, device.state);
             }
             shown = devices.to_vec();
