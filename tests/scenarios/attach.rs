@@ -310,3 +310,70 @@ fn lost_frames_up_to_the_patience_change_no_command() {
         assert!(run(options) == whole, "{options}");
     }
 }
+
+/// One frame more than the patience is a fault in that very period, one fewer is nothing; the machine, the period, the tick and
+/// whether frames are lost or late are drawn, and the drives' own watchdog waits longer. In real time the same fault comes.
+#[test]
+fn a_frame_beyond_the_patience_is_a_fault_in_its_period_on_both_clocks() {
+    let program = "G21 G91\nF3000\nG1 X40 Y20\nG1 Y-30 Z4\nM2\n";
+    for seed in 0..12 {
+        let mut random = Random::new(900 + seed);
+        let (patience, tick) = (random.below(9), 40 + random.below(200));
+        let kind = random.pick(&["lost_frames", "late_frames"]);
+        let period = random.pick(&["0.5", "1", "2"]);
+        let acceleration = random.between(300.0, 3000.0);
+        let run = |periods: u64, more: &[&str]| {
+            let frames = format!(
+                "driver.options={{{kind}={{ticks=[{tick}],periods={periods}}},patience_periods={patience},\
+                 watchdog_periods=100}}"
+            );
+            let settings = [
+                format!("loops.fine_period_ms={period}"),
+                format!("axes.x.max_acceleration_mm_per_s2={acceleration}"),
+                frames,
+            ];
+            let set: Vec<&str> = settings.iter().flat_map(|it| ["--set", it]).collect();
+            Scenario::text(program).with(&set).with(more).run()
+        };
+        let case = format!("seed {seed}: {kind}, patience {patience}, tick {tick}, {period} ms");
+        let commands =
+            |done: &Done| ["x", "y", "z"].map(|axis| done.cells(&format!("{axis}_cmd_mm")));
+        let kept = |done: &Done| (done.number("limit_violations"), done.number("guard_stops"));
+        if patience > 0 {
+            let within = run(patience, &[]);
+            let whole = Scenario::text(program)
+                .with(&["--set", &format!("loops.fine_period_ms={period}")])
+                .with(&[
+                    "--set",
+                    &format!("axes.x.max_acceleration_mm_per_s2={acceleration}"),
+                ])
+                .run();
+            assert_eq!(within.status(), 0, "{case}: {}", within.errors());
+            assert!(commands(&within) == commands(&whole), "{case}");
+        }
+        let beyond = run(patience + 1, &[]);
+        assert_eq!(beyond.status(), 3, "{case}");
+        let at = format!("tick {}", tick + patience);
+        let said = beyond.errors();
+        assert!(
+            said.contains("lost") && said.contains(&at),
+            "{case}: not at {at}: {said}"
+        );
+        assert_eq!(kept(&beyond), (0.0, 0.0), "{case}");
+        if seed < 2 {
+            let lenient = [
+                "loops.max_missed_periods=1000000",
+                "loops.max_missed_share=1",
+            ];
+            let more = ["--clock", "wall", "--set", lenient[0], "--set", lenient[1]];
+            let beyond = run(patience + 1, &more);
+            assert_eq!(beyond.status(), 3, "{case}");
+            assert!(
+                beyond.errors().contains("lost"),
+                "{case}: {}",
+                beyond.errors()
+            );
+            assert_eq!(kept(&beyond), (0.0, 0.0), "{case}");
+        }
+    }
+}
