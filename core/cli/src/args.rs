@@ -212,6 +212,9 @@ pub struct Serve {
     #[cfg(feature = "web")]
     #[arg(long, value_name = "NAME", requires = "http")]
     pub http_host: Vec<String>,
+    /// Leave trace, blocks, events and summary of every job in a folder of its own below this one
+    #[arg(long, value_name = "FOLDER")]
+    pub record: Option<PathBuf>,
     /// Enable real drives at once; simulated ones are enabled without it
     #[arg(long)]
     pub enable: bool,

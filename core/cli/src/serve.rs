@@ -9,12 +9,11 @@ use std::thread;
 
 use rustix::process::Signal;
 use signal_hook::iterator::Signals;
-use tandem_gcode::Lasting;
 use tandem_host::moves_metal;
 use tandem_machine::Machine;
 use tandem_session::controller::{Controller, Keeper, NoKeeper, Options, ScriptLine};
 use tandem_session::operator::Listen;
-use tandem_state::{Change, Owner, Recorder, Store, default_path};
+use tandem_state::{Change, Owner, Store, default_path};
 
 use crate::{args, built_in};
 
@@ -43,10 +42,7 @@ pub fn serve(options: &args::Serve) -> Result<u8, Box<dyn Error>> {
         .map(|store| store.load().to_program(&machine.home));
     let kept_in = store.as_ref().map(|store| store.path().to_owned());
     let keeper: Box<dyn Keeper> = match store {
-        Some(store) => Box::new(InStore {
-            recorder: store.recorder(),
-            store,
-        }),
+        Some(store) => Box::new(store),
         None => Box::new(NoKeeper),
     };
     let simulated = !moves_metal(&machine, &registry);
@@ -54,6 +50,7 @@ pub fn serve(options: &args::Serve) -> Result<u8, Box<dyn Error>> {
         clock: options.clock.into(),
         listen: listen.clone(),
         programs: options.programs.clone(),
+        record: options.record.clone(),
         enable: !options.disabled && (options.enable || simulated),
         script,
         uptime_periods: options.uptime_periods,
@@ -91,30 +88,6 @@ pub fn serve(options: &args::Serve) -> Result<u8, Box<dyn Error>> {
     #[cfg(feature = "web")]
     drop(page);
     Ok(0)
-}
-
-/// Keeps what lasts in the state file.
-struct InStore {
-    recorder: Recorder,
-    store: Store,
-}
-
-impl Keeper for InStore {
-    fn commit(&self, lasting: &Lasting) -> Result<(), String> {
-        self.store
-            .commit(vec![Change::Program(Arc::new(lasting.clone()))])
-            .map_err(|e| e.to_string())
-    }
-
-    fn record(&self, lasting: &Lasting) {
-        // Who asks for the state is told of the trouble; the machine goes on.
-        let recorded = self
-            .recorder
-            .record(Change::Program(Arc::new(lasting.clone())));
-        if let Err(error) = recorded {
-            say!("{error}");
-        }
-    }
 }
 
 /// The state file: the one that is named, else that of the machine; a replay keeps nothing unless it is told to.

@@ -8,7 +8,7 @@ use std::sync::atomic::Ordering::Relaxed;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use tandem_fine::{Fault, FineLoop, Left};
+use tandem_fine::{Fault, FaultKind, FineLoop, Left};
 use tandem_gcode::{CheckReport, Program};
 use tandem_machine::Machine;
 use tandem_recorder::Summary;
@@ -53,6 +53,97 @@ pub struct Resident<'r> {
     uptime_periods: u64,
     /// The drives hold between jobs.
     enabled: bool,
+    /// The driver does not reach its drives any more: they are to be claimed anew.
+    lost: bool,
+}
+
+/// Drives that are claimed, none of them enabled, and the loop at them that has nothing to do.
+struct Claimed {
+    /// It stands where the drives are.
+    machine: Machine,
+    roster: Roster,
+    attached: Attached,
+    watch: Option<HangWatch>,
+    /// Bit per axis of which it is not known where it is.
+    unknown_axes: u32,
+    fine: Box<FineLoop>,
+}
+
+impl Claimed {
+    fn of(
+        machine: Machine,
+        registry: &Registry,
+        clock: Clock,
+        (controls, status): (&Arc<Controls>, &Arc<Status>),
+    ) -> Result<Self, HostError> {
+        let switches = Switches {
+            clock: Some(clock),
+            unhomed: true,
+            reset: true,
+            ..Switches::default()
+        };
+        let mut plugins = Plugins::of(&machine, registry)?;
+        plugins.check_staying(&machine, switches)?;
+        plugins.add_faults(&machine)?;
+        let (machine, plugins) = plugins.attach(machine, registry, switches)?;
+        let roster = plugins.claim.roster();
+        begin(&machine, &roster, clock)?;
+        let watch = plugins.watch;
+        let Some((driver, attached)) = plugins.claim.into_parts() else {
+            return Err(HostError::System("the drives are not claimed".to_string()));
+        };
+        let mut unknown_axes = plugins
+            .joints
+            .axes_moved_by(!(attached.known | attached.homed));
+        if machine.require_homing {
+            // As for a run: whatever the drives say, the machine file asks for it once each time that they are claimed.
+            unknown_axes |= machine
+                .homing
+                .iter()
+                .fold(0, |axes, of| axes | 1 << of.axis);
+        }
+        if let Some(watch) = &watch {
+            watch.begin(Arc::clone(controls), Arc::clone(status));
+        }
+        let ready = Ready::of_source_on(
+            &roster,
+            machine.clone(),
+            registry,
+            None,
+            |_| Box::new(Nothing),
+            switches,
+        )?;
+        let shared = (Arc::clone(controls), Arc::clone(status));
+        let made = Made::of(ready, &attached, clock == Clock::Wall, shared);
+        // How long exchanges take is measured of runs alone.
+        let exchange = Arc::<ExchangeTimes>::default();
+        let driver = Box::new(exchange_time::Timed::new(
+            driver,
+            machine.fine_period_s,
+            exchange,
+        ));
+        let mut fine = Box::new(FineLoop::new(
+            &made.config,
+            made.end,
+            driver,
+            made.kinematics,
+        ));
+        fine.stay();
+        fine.begin_ended();
+        Ok(Self {
+            machine,
+            roster,
+            attached,
+            watch,
+            unknown_axes,
+            fine,
+        })
+    }
+}
+
+/// Whether behind this fault the driver itself is gone, or what it drives.
+fn is_lost(fault: &Fault) -> bool {
+    matches!(fault.kind, FaultKind::Driver | FaultKind::Lost { .. })
 }
 
 /// A job that is ready to be driven; nothing has moved.
@@ -118,80 +209,57 @@ impl<'r> Resident<'r> {
         registry: &'r Registry,
         clock: Clock,
     ) -> Result<Self, HostError> {
-        let switches = Switches {
-            clock: Some(clock),
-            unhomed: true,
-            reset: true,
-            ..Switches::default()
-        };
-        let mut plugins = Plugins::of(&machine, registry)?;
-        plugins.check_staying(&machine, switches)?;
-        plugins.add_faults(&machine)?;
-        let (machine, plugins) = plugins.attach(machine, registry, switches)?;
-        let roster = plugins.claim.roster();
-        begin(&machine, &roster, clock)?;
-        let watch = plugins.watch;
-        let Some((driver, attached)) = plugins.claim.into_parts() else {
-            return Err(HostError::System("the drives are not claimed".to_string()));
-        };
-        let mut unknown_axes = plugins
-            .joints
-            .axes_moved_by(!(attached.known | attached.homed));
-        if machine.require_homing {
-            // As for a run: whatever the drives say, the machine file asks for it once.
-            unknown_axes |= machine
-                .homing
-                .iter()
-                .fold(0, |axes, of| axes | 1 << of.axis);
-        }
         let (controls, status) = (Arc::<Controls>::default(), Arc::<Status>::default());
-        if let Some(watch) = &watch {
-            watch.begin(Arc::clone(&controls), Arc::clone(&status));
-        }
-        let ready = Ready::of_source_on(
-            &roster,
-            machine.clone(),
-            registry,
-            None,
-            |_| Box::new(Nothing),
-            switches,
-        )?;
-        let shared = (Arc::clone(&controls), Arc::clone(&status));
-        let made = Made::of(ready, &attached, clock == Clock::Wall, shared);
-        // How long exchanges take is measured of runs alone.
-        let exchange = Arc::<ExchangeTimes>::default();
-        let driver = Box::new(exchange_time::Timed::new(
-            driver,
-            machine.fine_period_s,
-            exchange,
-        ));
-        let mut fine = Box::new(FineLoop::new(
-            &made.config,
-            made.end,
-            driver,
-            made.kinematics,
-        ));
-        fine.stay();
-        fine.begin_ended();
+        let claimed = Claimed::of(machine, registry, clock, (&controls, &status))?;
         let mut this = Self {
             engine: Engine::Down(None),
-            machine,
+            machine: claimed.machine,
             registry,
             clock,
-            roster,
-            attached,
+            roster: claimed.roster,
+            attached: claimed.attached,
             controls,
             status,
-            watch,
-            unknown_axes,
+            watch: claimed.watch,
+            unknown_axes: claimed.unknown_axes,
             uptime_periods: 0,
             enabled: false,
+            lost: false,
         };
-        this.engine = match clock {
-            Clock::Virtual => Engine::Here(fine),
-            Clock::Wall => this.thread(fine, true)?,
-        };
+        this.engine = this.engine_of(claimed.fine, true)?;
         Ok(this)
+    }
+
+    /// Claims drives once more that a driver has lost: the bus is brought up as at the start, and asked where everything stands.
+    /// What it was before is let go of first. Host; allocates.
+    ///
+    /// # Errors
+    /// The drives cannot be reached: nothing is claimed, and it can be tried again.
+    fn attach_again(&mut self) -> Result<(), HostError> {
+        self.uptime_periods += self.engine.periods();
+        let engine = std::mem::replace(&mut self.engine, Engine::Down(None));
+        if let Some(fine) = engine.end()? {
+            // Whether that lets go of what it does not reach says nothing.
+            let _ = fine.into_driver().stop();
+        }
+        self.watch = None;
+        let shared = (&self.controls, &self.status);
+        let claimed = Claimed::of(self.machine.clone(), self.registry, self.clock, shared)?;
+        self.machine = claimed.machine;
+        self.roster = claimed.roster;
+        self.attached = claimed.attached;
+        self.unknown_axes = claimed.unknown_axes;
+        self.watch = claimed.watch;
+        self.engine = self.engine_of(claimed.fine, true)?;
+        self.lost = false;
+        Ok(())
+    }
+
+    fn engine_of(&self, fine: Box<FineLoop>, told: bool) -> Result<Engine, HostError> {
+        match self.clock {
+            Clock::Virtual => Ok(Engine::Here(fine)),
+            Clock::Wall => self.thread(fine, told),
+        }
     }
 
     fn thread(&self, fine: Box<FineLoop>, told: bool) -> Result<Engine, HostError> {
@@ -354,8 +422,8 @@ impl<'r> Resident<'r> {
         }
     }
 
-    /// Enables the drives where they stand; with `resets` their faults are reset first. The outcome's fault is that of a drive
-    /// that does not hold. Host.
+    /// Enables the drives where they stand; with `resets` their faults are reset first, and drives that were lost are claimed
+    /// anew. The outcome's fault is that of a drive that does not hold. Host.
     ///
     /// # Errors
     /// The computer refuses, or plugins do.
@@ -368,6 +436,9 @@ impl<'r> Resident<'r> {
             unhomed: true,
             ..Switches::default()
         };
+        if resets && self.lost {
+            self.attach_again()?;
+        }
         let job = self.source("enabling", Box::new(Nothing), switches)?;
         self.controls.let_go.store(false, Relaxed);
         self.controls.emergency_stop.store(false, Relaxed);
@@ -412,10 +483,7 @@ impl<'r> Resident<'r> {
             let Some(fine) = fine.take() else {
                 return Err(HostError::System("the fine loop is gone".to_string()));
             };
-            self.engine = match self.clock {
-                Clock::Virtual => Engine::Here(fine),
-                Clock::Wall => self.thread(fine, false)?,
-            };
+            self.engine = self.engine_of(fine, false)?;
         }
         let (mut soft_loop, conclusion) = job.begin(self.clock, observer);
         let end = match self.clock {
@@ -433,6 +501,7 @@ impl<'r> Resident<'r> {
             self.unknown_axes &= !homes;
         }
         self.enabled &= outcome.fault.is_none();
+        self.lost |= outcome.fault.as_ref().is_some_and(is_lost);
         Ok(outcome)
     }
 
@@ -583,6 +652,7 @@ impl<'r> Resident<'r> {
         let words = crate::messages::fault_text::describe(machine, &joints, &fault, known);
         self.uptime_periods += before;
         self.enabled = false;
+        self.lost |= is_lost(&fault);
         self.clear_controls();
         Ok(Some(words))
     }

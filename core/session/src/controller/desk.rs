@@ -1,12 +1,13 @@
 //! Where all requests come together: what is done at once is done here, the rest is ordered of the loop that drives.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 use std::io::Write as _;
 use std::os::unix::net::UnixStream;
 use std::path::PathBuf;
-use std::sync::atomic::AtomicBool;
 use std::sync::atomic::Ordering::{Acquire, Relaxed, Release};
+use std::sync::atomic::{AtomicBool, AtomicI64};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::SystemTime;
 
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
@@ -15,8 +16,11 @@ use tandem_host::{Command, JobOutcome};
 use tandem_machine::Machine;
 use tandem_rings::{MachineState, Status, Switched};
 use tandem_sdk::AxisVector;
+use tandem_state::{Change, JobKind, Outcome};
 
 use super::described;
+use super::history::{HELD, History, alarm_shown};
+use super::keeper::Keeper;
 use super::lines::{Judged, SharedLines, lock};
 use super::path::DrawnPath;
 use super::programs::{Upload, discard};
@@ -27,33 +31,8 @@ use super::words::word_of;
 use crate::jog::{JogController, JogMessage, ReachMessage};
 use crate::operator::OperatorHub;
 
-/// Jobs and alarms that are remembered.
-const REMEMBERED: usize = 100;
 /// Longest program, bytes.
 pub const MAX_PROGRAM_BYTES: u64 = 64 << 20;
-
-/// Keeps what lasts where a killed process does not lose it.
-pub trait Keeper: Send + Sync {
-    /// Keeps `lasting`, which a client has asked for: it is safe when this returns.
-    ///
-    /// # Errors
-    /// Why it is not, in words.
-    fn commit(&self, lasting: &Lasting) -> Result<(), String>;
-
-    /// Keeps `lasting`, which the path has made true; nobody waits for it.
-    fn record(&self, lasting: &Lasting);
-}
-
-/// Keeps nothing: what lasts ends with the process.
-pub struct NoKeeper;
-
-impl Keeper for NoKeeper {
-    fn commit(&self, _lasting: &Lasting) -> Result<(), String> {
-        Ok(())
-    }
-
-    fn record(&self, _lasting: &Lasting) {}
-}
 
 /// What is driven.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -160,8 +139,7 @@ pub struct Inner {
     /// The fault that the machine stands in, and whether it is an emergency stop.
     pub fault: Option<(String, bool)>,
     pub aborting: bool,
-    pub history: VecDeque<Value>,
-    pub alarms: VecDeque<Value>,
+    pub history: History,
     /// Parameters of the policy script, as the next job has them.
     pub policy_parameters: BTreeMap<String, f64>,
     upload: Option<Upload>,
@@ -182,6 +160,10 @@ pub struct Desk {
     scope: Mutex<Scope>,
     seen: Mutex<Seen>,
     frames: Mutex<Vec<(u64, String)>>,
+    /// What lasts, as it was given to the keeper last.
+    kept: Mutex<Option<Lasting>>,
+    /// On the virtual clock the time, ms; below zero where the computer's clock says.
+    replay_ms: AtomicI64,
     post: Mutex<Vec<(Option<u64>, String)>>,
     bell: (UnixStream, UnixStream),
     over: AtomicBool,
@@ -215,8 +197,7 @@ impl Desk {
             block_delete: false,
             fault: None,
             aborting: false,
-            history: VecDeque::new(),
-            alarms: VecDeque::new(),
+            history: History::of(&keeper.remembered()),
             policy_parameters: BTreeMap::new(),
             upload: None,
             last_state: None,
@@ -234,6 +215,8 @@ impl Desk {
             scope: Mutex::new(Scope::new(machine)),
             seen: Mutex::default(),
             frames: Mutex::default(),
+            kept: Mutex::default(),
+            replay_ms: AtomicI64::new(-1),
             post: Mutex::default(),
             bell,
             over: AtomicBool::new(false),
@@ -258,6 +241,41 @@ impl Desk {
     /// What of the last sample is shown.
     pub fn seen(&self) -> MutexGuard<'_, Seen> {
         self.seen.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// It is so late on the virtual clock, s.
+    pub fn set_replay_time(&self, at_s: f64) {
+        self.replay_ms.store((at_s * 1e3) as i64, Relaxed);
+    }
+
+    /// The time, ms since 1970; on the virtual clock since the process began.
+    pub fn now_unix_ms(&self) -> i64 {
+        let replay_ms = self.replay_ms.load(Relaxed);
+        if replay_ms >= 0 {
+            return replay_ms;
+        }
+        let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
+        since.map_or(0, |since| since.as_millis() as i64)
+    }
+
+    /// Keeps what the path has made true since this was called last. Soft side, once a rough period.
+    pub fn keep_reached(&self) {
+        let mut lines = lock(&self.lines);
+        if lines.settle() {
+            let lasting = lines.standing().lasting();
+            drop(lines);
+            self.keep(lasting);
+        }
+    }
+
+    /// Keeps what lasts, where it is otherwise than before.
+    pub fn keep(&self, lasting: Lasting) {
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        if kept.as_ref() != Some(&lasting) {
+            self.keeper
+                .record(Change::Program(Arc::new(lasting.clone())));
+            *kept = Some(lasting);
+        }
     }
 
     /// A client is gone.
@@ -430,9 +448,14 @@ impl Desk {
         };
         match name {
             "status" => Ok(Acted::Done(self.status_of(inner))),
-            "history" => Ok(Acted::Done(
-                json!({ "jobs": inner.history, "alarms": inner.alarms }),
+            "history" => {
+                let count = asked.whole_if_any("count").unwrap_or(HELD as u64);
+                Ok(Acted::Done(inner.history.show(count as usize)))
+            }
+            "alarms" => Ok(Acted::Done(
+                json!({ "alarms": inner.history.open_alarms() }),
             )),
+            "acknowledge" => self.acknowledge(asked, inner).map(Acted::Done),
             "list" => self.list().map(Acted::Done),
             "machine" => Ok(Acted::Done(described::machine(&self.machine))),
             "tables" => {
@@ -568,6 +591,35 @@ impl Desk {
         self.tell_state();
     }
 
+    /// What is driven from now on, for the history. The loop that drives.
+    pub fn begin_history(&self, mode: Mode, name: &str) {
+        let kind = match mode {
+            Mode::Program => JobKind::Program,
+            Mode::Homing => JobKind::Homing,
+            Mode::Mdi => JobKind::Mdi,
+            Mode::Jog => JobKind::Jog,
+            Mode::Idle | Mode::Enabling => return,
+        };
+        let mut inner = self.lock();
+        let loaded = inner.loaded.as_ref().filter(|_| mode == Mode::Program);
+        let hash = loaded.map_or(String::new(), |program| program.hash.clone());
+        let job = inner.history.begin(kind, name, &hash, self.now_unix_ms());
+        drop(inner);
+        self.keeper.record(Change::JobBegan(Box::new(job)));
+    }
+
+    /// Number and hash of the program or the lines that are driven, for the journal.
+    pub fn journal(&self) -> Option<(u64, String)> {
+        let inner = self.lock();
+        let number = inner.history.open()?;
+        let hash = inner.loaded.as_ref().map(|program| program.hash.clone());
+        match inner.mode {
+            Mode::Program => Some((number, hash.unwrap_or_default())),
+            Mode::Mdi => Some((number, String::new())),
+            _ => None,
+        }
+    }
+
     /// A job is over. The loop that drives.
     pub fn finish(&self, mode: Mode, name: &str, outcome: &JobOutcome, unknown_axes: u32) {
         let whole = outcome.fault.is_none() && !outcome.aborted;
@@ -578,7 +630,9 @@ impl Desk {
             !whole,
         );
         self.tell_driven(&driven, whole);
-        self.keeper.record(&lock(&self.lines).standing().lasting());
+        let lasting = lock(&self.lines).standing().lasting();
+        self.keep(lasting);
+        self.keeper.record(Change::LastPosition(outcome.position));
         self.hub.stands_at(&outcome.position);
         self.path().drive(&outcome.position);
         self.send_scope(true);
@@ -588,25 +642,28 @@ impl Desk {
         };
         let fault = outcome.summary.fault.clone();
         let how = match (&fault, outcome.aborted) {
-            (Some(_), _) => "fault",
-            (None, true) => "aborted",
-            (None, false) => "done",
+            (Some(_), _) if self.hub.controls().emergency_stop.load(Relaxed) => {
+                Outcome::EmergencyStop
+            }
+            (Some(_), _) => Outcome::Fault,
+            (None, true) => Outcome::Aborted,
+            (None, false) => Outcome::Done,
         };
-        let job = json!({
-            "job": mode.name(), "name": name, "outcome": how, "fault": fault,
-            "blocks": outcome.summary.blocks, "time_s": outcome.summary.motion_time_s, "stopped": outcome.summary.stopped,
-        });
         let mut inner = self.lock();
-        if mode != Mode::Enabling {
-            remember(&mut inner.history, job.clone());
+        if let Some(words) = &fault {
+            self.fault_in(&mut inner, words);
         }
-        if let Some(words) = fault {
-            self.fault_in(&mut inner, &words);
-        }
+        let ended = inner.history.end(outcome, how, self.now_unix_ms());
         (inner.mode, inner.unknown_axes, inner.aborting) = (Mode::Idle, unknown_axes, false);
         inner.enabled = outcome.fault.is_none() && (mode != Mode::Enabling || !outcome.aborted);
         drop(inner);
-        if mode != Mode::Enabling {
+        if let Some((id, end)) = ended {
+            let end = Box::new(end);
+            self.keeper.record(Change::JobEnded { id, end });
+            let job = json!({
+                "number": id, "job": mode.name(), "name": name, "outcome": how.word(), "fault": fault,
+                "blocks": outcome.summary.blocks, "time_s": outcome.summary.motion_time_s, "stopped": outcome.summary.stopped,
+            });
             self.send(None, &json!({ "event": "job", "job": job }));
         }
         self.stands(&outcome.position, unknown_axes);
@@ -625,13 +682,47 @@ impl Desk {
         let emergency = self.hub.controls().emergency_stop.load(Relaxed);
         inner.fault = Some((words.to_string(), emergency));
         inner.enabled = false;
-        remember(&mut inner.alarms, json!({ "fault": words }));
+        let code = if emergency { "emergency-stop" } else { "fault" };
+        let alarm = inner.history.raise(code, words, self.now_unix_ms());
+        self.send(
+            None,
+            &json!({ "event": "alarm", "raised": alarm_shown(&alarm) }),
+        );
+        self.keeper.record(Change::Raised(Box::new(alarm)));
         self.hub.begin_fault(words);
     }
 
-    /// A fault has come while nothing was driven.
+    /// An alarm that stops nothing. Host.
+    pub fn raise(&self, code: &str, words: &str) {
+        let now_unix_ms = self.now_unix_ms();
+        let alarm = self.lock().history.raise(code, words, now_unix_ms);
+        self.send(
+            None,
+            &json!({ "event": "alarm", "raised": alarm_shown(&alarm) }),
+        );
+        self.keeper.record(Change::Raised(Box::new(alarm)));
+    }
+
+    /// Somebody has seen alarms; it is on disk when this returns.
+    fn acknowledge(&self, asked: &Asked, inner: &mut Inner) -> Result<Value, String> {
+        let numbers = inner.history.open_alarms_of(asked.whole_if_any("alarm"))?;
+        let at_unix_ms = self.now_unix_ms();
+        let changes = numbers.iter().map(|id| Change::Acknowledged {
+            id: *id,
+            at_unix_ms,
+        });
+        self.keeper.commit(changes.collect())?;
+        inner.history.acknowledge(&numbers, at_unix_ms);
+        self.send(None, &json!({ "event": "alarm", "acknowledged": numbers }));
+        Ok(json!({ "acknowledged": numbers }))
+    }
+
+    /// A fault has come while nothing was driven, or the drives could not be enabled. The loop that drives.
     pub fn fault(&self, words: &str) {
-        self.fault_in(&mut self.lock(), words);
+        let mut inner = self.lock();
+        (inner.mode, inner.aborting) = (Mode::Idle, false);
+        self.fault_in(&mut inner, words);
+        drop(inner);
         lock(&self.lines).end_job(self.hub.position(), false, false, true);
         self.tell_state();
     }
@@ -675,13 +766,6 @@ fn begins_or_sets(name: &str) -> bool {
         "resume",
     ]
     .contains(&name)
-}
-
-fn remember(all: &mut VecDeque<Value>, one: Value) {
-    all.push_back(one);
-    if all.len() > REMEMBERED {
-        all.pop_front();
-    }
 }
 
 fn ratio(value: f64) -> Result<f64, String> {

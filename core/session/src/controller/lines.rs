@@ -160,6 +160,16 @@ impl Lines {
         self.judged.drain(..driven).collect()
     }
 
+    /// Takes up what the path has reached since; whether that is anything.
+    pub fn settle(&mut self) -> bool {
+        let reached = self.ledger.take();
+        let is_any = reached.is_some();
+        if let Some(moment) = reached {
+            self.standing.take_up(moment);
+        }
+        is_any
+    }
+
     /// The job is over, and the machine stands at `position`; `whole` where all that was read is driven, and `ended` where a
     /// program has come to its end, behind which modes are as at the start. What is on was `switched_off` otherwise. Lines that
     /// were taken: driven where whole, else not.
@@ -177,9 +187,7 @@ impl Lines {
             self.ledger.forget();
             self.waiting.clear();
         }
-        if let Some(moment) = self.ledger.take() {
-            self.standing.take_up(moment);
-        }
+        self.settle();
         if ended {
             self.standing.reset_modes();
         }

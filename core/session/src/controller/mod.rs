@@ -3,9 +3,12 @@
 
 mod described;
 mod desk;
+mod history;
+mod keeper;
 mod lines;
 mod path;
 mod programs;
+mod record;
 mod request;
 mod schema;
 mod scope;
@@ -17,7 +20,7 @@ mod talk;
 mod watch;
 mod words;
 
-pub use desk::{Keeper, NoKeeper};
+pub use keeper::{Keeper, NoKeeper, Remembered};
 pub use schema::{requests_table, schema};
 pub use serve::{Controller, Options, ScriptLine};
 pub use states::{ControllerState, judge, requests, table};

@@ -78,7 +78,7 @@ pub fn schema() -> Value {
 }
 
 /// What clients are told that they have not asked for in this moment.
-pub const EVENTS: [(&str, &str); 11] = [
+pub const EVENTS: [(&str, &str); 12] = [
     ("state", "the machine's state is another one"),
     ("job", "what became of a job"),
     ("driven", "the line `id` is driven"),
@@ -88,6 +88,7 @@ pub const EVENTS: [(&str, &str); 11] = [
         "the program waits on `line` (M0, M1, M6): `resume` goes on",
     ),
     ("refused", "a job could not begin, or a jog was refused"),
+    ("alarm", "an alarm was raised, or acknowledged"),
     ("lease", "the control lease was asked for, or lost"),
     ("status", "what was subscribed to; `lost` lines before it"),
     ("scope", "samples; `lost` frames before it"),

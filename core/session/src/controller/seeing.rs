@@ -61,7 +61,9 @@ impl Desk {
             "spindle_turns_rpm": self.status.spindle.turns_rad_per_s.load() * 30.0 / std::f64::consts::PI,
             "block_delete": inner.block_delete,
             "fault": inner.fault.as_ref().map(|(words, _)| words.clone()),
-            "alarms": inner.alarms.len(),
+            "alarms": inner.history.open_alarms(),
+            "job_number": inner.history.open(),
+            "state_trouble": self.keeper.trouble(),
         });
         if let (Value::Object(all), Value::Object(more)) = (&mut status, more) {
             all.extend(more);

@@ -11,10 +11,13 @@ use tandem_host::{
     axis_limits, interpreter_config, moves_metal, planner,
 };
 use tandem_machine::Machine;
+use tandem_state::Change;
 
-use super::desk::{Desk, From, Keeper, Loaded, Mode, Order};
+use super::desk::{Desk, From, Loaded, Mode, Order};
+use super::keeper::Keeper;
 use super::lines::{LineSource, Lines, lock};
 use super::path::DrawnPath;
+use super::record::Recording;
 use super::talk::Office;
 use super::watch::{Jogs, Notes, Script, Watch};
 use crate::HOMING;
@@ -29,6 +32,8 @@ pub struct Options {
     pub listen: Listen,
     /// The folder of the programs that clients may load by their path.
     pub programs: Option<PathBuf>,
+    /// The folder in which every job leaves its files; none where none is kept.
+    pub record: Option<PathBuf>,
     /// Enable the drives at once.
     pub enable: bool,
     /// On the virtual clock: what clients ask, and when.
@@ -84,6 +89,7 @@ pub struct Controller<'r> {
     clock: Clock,
     script: Script,
     simulated: bool,
+    record: Option<PathBuf>,
 }
 
 impl<'r> Controller<'r> {
@@ -120,6 +126,7 @@ impl<'r> Controller<'r> {
         let hub = Arc::new(OperatorHub::new(&machine, controls, Arc::clone(&status)));
         let lines = Arc::new(std::sync::Mutex::new(lines));
         let unknown = not_homed(&machine, resident.unknown_axes());
+        let keepsakes = keeper.remembered().policy_parameters;
         let desk = Desk::new(
             &machine,
             hub,
@@ -132,6 +139,19 @@ impl<'r> Controller<'r> {
         )
         .map_err(system)?;
         let desk = Arc::new(desk);
+        if options.clock == Clock::Virtual {
+            desk.set_replay_time(0.0);
+        }
+        for (name, value) in keepsakes {
+            // A script that has changed knows it no longer: then the machine file counts, and somebody is told.
+            if let Err(why) = resident.set_policy_parameter(&name, value) {
+                desk.raise(
+                    "policy-parameter",
+                    &format!("{name} = {value} of the state: {why}"),
+                );
+            }
+        }
+        desk.lock().policy_parameters = resident.policy_parameters();
         desk.stands(&machine.start, unknown);
         if options.enable {
             desk.lock().order = Some(Order::Enable {
@@ -152,6 +172,7 @@ impl<'r> Controller<'r> {
             clock: options.clock,
             script,
             simulated,
+            record: options.record,
         })
     }
 
@@ -188,9 +209,8 @@ impl<'r> Controller<'r> {
         }
         Script::flush(&self.desk, self.resident.uptime_periods(), self.clock, tell);
         self.resident.stop(&mut Notes(tell))?;
-        self.desk
-            .keeper
-            .record(&lock(&self.desk.lines).standing().lasting());
+        let lasting = lock(&self.desk.lines).standing().lasting();
+        self.desk.keep(lasting);
         drop(self.server);
         Ok(())
     }
@@ -274,16 +294,25 @@ impl<'r> Controller<'r> {
     }
 
     fn set_policy_parameter(&mut self, from: From, name: &str, value: f64) {
+        let before = self.resident.policy_parameters();
         let set = self.resident.set_policy_parameter(name, value);
+        let kept = set.map_err(|e| e.to_string()).and_then(|()| {
+            let name = name.to_string();
+            self.desk
+                .keeper
+                .commit(vec![Change::PolicyParameter { name, value }])
+        });
+        if let (Err(_), Some(before)) = (&kept, before.get(name)) {
+            // It was fit before.
+            let _ = self.resident.set_policy_parameter(name, *before);
+        }
         let parameters = self.resident.policy_parameters();
         let mut inner = self.desk.lock();
         inner.order = None;
         inner.policy_parameters.clone_from(&parameters);
         drop(inner);
-        let answer = set
-            .map(|()| json!({ "parameters": parameters }))
-            .map_err(|e| e.to_string());
-        self.desk.answer(from, answer);
+        self.desk
+            .answer(from, kept.map(|()| json!({ "parameters": parameters })));
     }
 
     /// Checks a program and makes the job that drives it; the path is that which is drawn from now on.
@@ -394,6 +423,8 @@ impl<'r> Controller<'r> {
         }
         self.desk.scope().begin_job(&job.signals());
         self.desk.begin(mode);
+        self.desk.begin_history(mode, name);
+        let recording = self.recording(mode, &job.signals());
         if let Some(from) = from {
             self.desk.answer(from, Ok(json!({ "begins": name })));
         }
@@ -405,9 +436,28 @@ impl<'r> Controller<'r> {
             self.clock,
             length_mm,
         );
+        watch.recording = recording;
         let outcome = self.resident.drive(job, &mut watch)?;
+        let recording = watch.recording.take();
         self.finish(mode, name, &outcome);
+        for why in recording.map_or(vec![], |recording| recording.finish(&outcome)) {
+            self.desk.raise("record", &why);
+        }
         Ok(())
+    }
+
+    /// The files that a job leaves, where they are kept; a disk that cannot take them keeps no job from being driven.
+    fn recording(&self, mode: Mode, signals: &[String]) -> Option<Recording> {
+        let root = self.record.as_ref()?;
+        let number = self.desk.lock().history.open()?;
+        let about = (number, mode.name());
+        match Recording::begin(root, about, self.resident.machine(), signals) {
+            Ok(recording) => Some(recording),
+            Err(why) => {
+                self.desk.raise("record", &why);
+                None
+            }
+        }
     }
 
     fn finish(&self, mode: Mode, name: &str, outcome: &JobOutcome) {
@@ -428,7 +478,15 @@ impl<'r> Controller<'r> {
             self.clock,
             0.0,
         );
-        let outcome = self.resident.enable(resets, &mut watch)?;
+        let outcome = match self.resident.enable(resets, &mut watch) {
+            Ok(outcome) => outcome,
+            Err(why) => {
+                // The machine stays where it was; who can, resets once more.
+                self.desk.fault(&why.to_string());
+                self.desk.answer(from, Err(why.to_string()));
+                return Ok(());
+            }
+        };
         self.finish(Mode::Enabling, "enabling", &outcome);
         let answer = match &outcome.summary.fault {
             Some(fault) => Err(fault.clone()),

@@ -1,10 +1,12 @@
 //! What clients set: offsets, tools, parameters.
 
 use std::fmt::Write as _;
+use std::sync::Arc;
 
 use serde_json::{Value, json};
 use tandem_gcode::{Lasting, Tool, system_code};
 use tandem_sdk::AxisVector;
+use tandem_state::Change;
 
 use super::desk::Desk;
 use super::lines::lock;
@@ -25,6 +27,7 @@ impl Desk {
                 let _ = write!(words, " {letter}[{value:.9}]");
             }
         }
+        let mut changes = vec![];
         let lasting = match name {
             "touch-off" | "set-offset" => {
                 let system = match asked.with.get("system") {
@@ -53,11 +56,17 @@ impl Desk {
                 }
                 let mut lasting = lines.standing().lasting();
                 lasting.parameters.insert(number as u32, value);
+                // Beside those that last by themselves, those that somebody has set by hand do.
+                changes.push(Change::ListParameter {
+                    number: number as usize,
+                    value,
+                });
                 lasting
             }
             _ => self.with_tool(lines.standing().lasting(), asked)?,
         };
-        self.keeper.commit(&lasting)?;
+        changes.push(Change::Program(Arc::new(lasting.clone())));
+        self.keeper.commit(changes)?;
         lines.set_lasting(&lasting);
         Ok(json!({ "set": name }))
     }

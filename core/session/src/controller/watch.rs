@@ -10,10 +10,12 @@ use tandem_gcode::Item;
 use tandem_host::{Clock, RunObserver, StopAnswer};
 use tandem_rings::{Rest, Sample};
 use tandem_rough::Source;
-use tandem_sdk::{AxisVector, Block, BlockReport, Curve};
+use tandem_sdk::{AxisVector, Block, BlockReport, Curve, Event};
+use tandem_state::Driven;
 
 use super::desk::{Desk, Mode};
 use super::lines::lock;
+use super::record::Recording;
 use super::serve::{ScriptLine, Tell};
 use super::talk::Protocol2;
 use crate::operator::{Lease, Talk};
@@ -97,6 +99,13 @@ pub struct Watch<'a> {
     ends_of: VecDeque<(u64, AxisVector)>,
     /// Where the last sample was, for those who draw the path.
     place: Option<AxisVector>,
+    /// The line that is driven, where it is another one than was told, and the epoch.
+    line: Option<u32>,
+    epoch: u64,
+    /// What is driven has this number and hash.
+    journal: Option<(u64, String)>,
+    /// What the job leaves behind.
+    pub recording: Option<Recording>,
     tick: u64,
     ends: bool,
 }
@@ -121,6 +130,10 @@ impl<'a> Watch<'a> {
             block: None,
             ends_of: VecDeque::new(),
             place: None,
+            line: None,
+            epoch: 0,
+            journal: desk.journal(),
+            recording: None,
             tick: 0,
             ends: false,
         }
@@ -151,18 +164,31 @@ impl RunObserver for Watch<'_> {
         self.clock == Clock::Wall || !self.script.lines.is_empty()
     }
 
-    fn rest(&mut self, _rest: &Rest) {
+    fn rest(&mut self, rest: &Rest) {
+        self.epoch = u64::from(rest.epoch) + 1;
         self.desk.hub.end_wait();
     }
 
-    fn block(&mut self, block: &Block, curve: Option<Curve<'_>>, _report: &BlockReport) {
+    fn block(&mut self, block: &Block, curve: Option<Curve<'_>>, report: &BlockReport) {
+        if let Some(recording) = &mut self.recording {
+            recording.block(block, report);
+        }
         self.ends_of.push_back((block.index, block.end));
         if self.mode != Mode::Program {
             self.desk.path().block(block, curve);
         }
     }
 
+    fn event(&mut self, event: &Event) {
+        if let Some(recording) = &mut self.recording {
+            recording.event(event);
+        }
+    }
+
     fn sample(&mut self, sample: &Sample, _deviation_mm: f64, signals: &[f64]) {
+        if let Some(recording) = &mut self.recording {
+            recording.sample(sample, signals);
+        }
         self.driven_mm += sample.feed_mm_per_s * self.desk.machine.fine_period_s;
         let share = if self.length_mm > 0.0 {
             (self.driven_mm / self.length_mm).min(1.0)
@@ -172,6 +198,9 @@ impl RunObserver for Watch<'_> {
         self.desk.hub.sample(sample, share);
         self.desk.scope().sample(sample, signals);
         self.place = Some(sample.command);
+        if sample.line != 0 {
+            self.line = Some(sample.line);
+        }
         let is_next = self.block != Some(sample.block);
         if is_next {
             while self
@@ -204,6 +233,17 @@ impl RunObserver for Watch<'_> {
         if let Some(place) = self.place.take() {
             self.desk.path().drive(&place);
         }
+        if let (Some(line), Some((job, hash))) = (self.line.take(), &self.journal) {
+            self.desk.keeper.driven(Driven {
+                job: *job,
+                hash: hash.clone(),
+                line,
+                epoch: self.epoch,
+            });
+        }
+        if self.mode != Mode::Idle {
+            self.desk.keep_reached();
+        }
         self.desk.send_scope(false);
         self.desk.tell_state();
         Script::flush(self.desk, self.tick, self.clock, self.tell);
@@ -211,6 +251,8 @@ impl RunObserver for Watch<'_> {
 
     fn before_tick(&mut self, uptime_periods: u64) {
         self.tick = uptime_periods;
+        let at_s = uptime_periods as f64 * self.desk.machine.fine_period_s;
+        self.desk.set_replay_time(at_s);
         self.script.say_due(self.desk, uptime_periods, self.tell);
     }
 }

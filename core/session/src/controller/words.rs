@@ -116,12 +116,13 @@ use Kind::{Axes, Number, OneOf, Switch, Text, Texts, Whole};
 
 /// All requests. A jog that is let go has a row of its own, `jog-stop`.
 #[rustfmt::skip]
-pub const WORDS: [Word; 37] = [
+pub const WORDS: [Word; 39] = [
     //                        E D N R J M P H S F
     word("status",           "++++++++++", FREE, &[], "everything that is shown of the machine"),
     word("subscribe",        "++++++++++", FREE, &[need("rate_hz", Number), may("fields", Texts), may("changes", Switch)],
         "`status` events, 0.01 to 100 a second, 0 for none; `fields` of the status alone, with `changes` those that are otherwise than before"),
-    word("history",          "++++++++++", FREE, &[], "the last jobs and alarms"),
+    word("history",          "++++++++++", FREE, &[may("count", Whole)], "the last jobs and alarms, the latest first"),
+    word("alarms",           "++++++++++", FREE, &[], "alarms that nobody has acknowledged"),
     word("list",             "++++++++++", FREE, &[], "the programs folder: name, bytes, when it was written (ms since 1970)"),
     word("machine",          "++++++++++", FREE, &[], "axes with their limits, the keep-alive, and what is refused in which state"),
     word("tables",           "++++++++++", FREE, &[], "work offsets and tools"),
@@ -162,6 +163,7 @@ pub const WORDS: [Word; 37] = [
     word("reset",            "+kkkkkkks+", HELD, &[], "takes back a fault and enables the drives"),
     word("enable",           "f+eeeeeesf", HELD, &[], "has the drives hold"),
     word("disable",          "fo++bbbbsf", HELD, &[], "has the drives let go"),
+    word("acknowledge",      "++++++++++", HELD, &[may("alarm", Whole)], "one alarm by its number, or all"),
     word("touch-off",        "fdn+bbbbsf", SETS, &[may("system", Text), need("x_mm", Axes)],
         "where the machine stands is called so, in `system` as in `G55`, else in the one in force"),
     word("set-offset",       "++++bbbbs+", SETS, &[may("system", Text), need("x_mm", Axes)], "the origin, machine coordinates"),

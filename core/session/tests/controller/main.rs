@@ -1,8 +1,10 @@
 //! A controller on the virtual clock: what clients ask by ticks, and what they are told.
 
+mod every_state;
 mod page;
 mod seeing;
 mod support;
+mod truth;
 
 use serde_json::{Value, json};
 use tandem_gcode::Program;
@@ -36,7 +38,10 @@ fn a_drive_that_faults_is_reset_by_its_word_and_by_no_other() {
             told.ok(id);
         }
         let fault = told.ok(faulted)["fault"].to_string();
-        assert!(fault.contains("brake chopper") && fault.contains(name), "{fault}");
+        assert!(
+            fault.contains("brake chopper") && fault.contains(name),
+            "{fault}"
+        );
         for id in [enable, refused] {
             let why = told.why(id);
             assert!(why.contains("reset"), "{name}: {why}");
@@ -126,7 +131,7 @@ fn a_day_at_the_machine_in_one_process() {
         ("jog", "done"),
         ("mdi", "done"),
         ("program", "aborted"),
-        ("program", "fault"),
+        ("program", "emergency-stop"),
         ("mdi", "done"),
         ("program", "done"),
     ];

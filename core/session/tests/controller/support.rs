@@ -9,13 +9,21 @@ use tandem_host::{Clock, Registry};
 use tandem_machine::Machine;
 use tandem_session::controller::{Controller, Keeper, Options, ScriptLine};
 use tandem_session::operator::Listen;
+use tandem_state::Change;
 
 pub fn examples() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines")
 }
 
 pub fn machine(name: &str) -> Machine {
-    Machine::read(&examples().join(name), &[]).unwrap()
+    machine_with(name, &[])
+}
+
+pub fn machine_with(name: &str, keys: &[(&str, &str)]) -> Machine {
+    let keys = keys
+        .iter()
+        .map(|(key, value)| ((*key).to_string(), (*value).to_string()));
+    Machine::read(&examples().join(name), &keys.collect::<Vec<_>>()).unwrap()
 }
 
 pub fn registry() -> Registry {
@@ -69,6 +77,7 @@ impl Told {
             clock: Clock::Virtual,
             listen: Listen::default(),
             programs: None,
+            record: None,
             enable: true,
             script: says.lines,
             uptime_periods: 0,
@@ -138,17 +147,20 @@ impl Told {
     }
 }
 
-/// Keeps what it is given.
+/// Keeps what it is given: what lasts, and all of it.
 #[derive(Clone, Default)]
-pub struct Kept(pub Arc<Mutex<Vec<Lasting>>>);
+pub struct Kept(pub Arc<Mutex<Vec<Lasting>>>, pub Arc<Mutex<Vec<Change>>>);
 
 impl Keeper for Kept {
-    fn commit(&self, lasting: &Lasting) -> Result<(), String> {
-        self.record(lasting);
+    fn commit(&self, changes: Vec<Change>) -> Result<(), String> {
+        changes.into_iter().for_each(|change| self.record(change));
         Ok(())
     }
 
-    fn record(&self, lasting: &Lasting) {
-        self.0.lock().unwrap().push(lasting.clone());
+    fn record(&self, change: Change) {
+        if let Change::Program(lasting) = &change {
+            self.0.lock().unwrap().push(Lasting::clone(lasting));
+        }
+        self.1.lock().unwrap().push(change);
     }
 }

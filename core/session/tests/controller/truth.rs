@@ -1,0 +1,305 @@
+//! What is shown and kept is what is: history, alarms, journal, and what a job changes, as the path reaches it; a driver that
+//! was lost is attached again.
+
+use std::path::Path;
+
+use serde_json::{Value, json};
+use tandem_machine::Machine;
+use tandem_session::controller::NoKeeper;
+use tandem_state::{Change, LastingState, Outcome, Owner, Store};
+
+use crate::support::{Kept, Says, Told, examples, machine, machine_with};
+
+/// Two seconds, then #500, then two seconds.
+const WRITES: &str = "G21 G90 F1200\nG1 X40\n#500 = 7\nG10 L2 P2 X5\nG1 Y40\nM2\n";
+
+#[test]
+fn what_a_job_writes_is_kept_when_the_path_reaches_it() {
+    let kept = Kept::default();
+    let mut says = Says::new();
+    says.ask(
+        1000,
+        "load",
+        json!({ "text": WRITES, "name": "writes.ngc" }),
+    );
+    says.ask(10, "start", json!({}));
+    let before = says.ask(1000, "status", json!({}));
+    let behind = says.ask(2000, "status", json!({}));
+    says.ask(10, "emergency-stop", json!({}));
+    says.ask(3000, "status", json!({}));
+    let told = Told::by(
+        &machine("mill-3axis.toml"),
+        says,
+        |_| (),
+        Box::new(kept.clone()),
+    );
+    assert_eq!(
+        (&told.ok(before)["state"], &told.ok(behind)["state"]),
+        (&json!("running"), &json!("running"))
+    );
+    let changes = kept.1.lock().unwrap();
+    let is_written = |change: &Change| matches!(change, Change::Program(of) if of.parameters.get(&500) == Some(&7.0) && of.origins[1][0] == 5.0);
+    let written = changes.iter().position(is_written).unwrap();
+    let ended = changes
+        .iter()
+        .position(|change| matches!(change, Change::JobEnded { .. }))
+        .unwrap();
+    assert!(
+        written < ended,
+        "{written} {ended}: while the job is driven, not at its end"
+    );
+
+    // Stopped on the first line it is never written.
+    let kept = Kept::default();
+    let mut says = Says::new();
+    says.ask(
+        1000,
+        "load",
+        json!({ "text": WRITES, "name": "writes.ngc" }),
+    );
+    says.ask(10, "start", json!({}));
+    says.ask(1000, "abort", json!({}));
+    says.ask(3000, "status", json!({}));
+    Told::by(
+        &machine("mill-3axis.toml"),
+        says,
+        |_| (),
+        Box::new(kept.clone()),
+    );
+    assert!(!kept.1.lock().unwrap().iter().any(is_written));
+}
+
+fn open(path: &Path, machine: &Machine) -> Store {
+    let store = Store::open(path, Owner::of(machine)).unwrap();
+    if store.is_new() {
+        let initial = LastingState::initial(machine);
+        store
+            .commit(vec![Change::Whole(Box::new(initial))])
+            .unwrap();
+    }
+    store
+}
+
+#[test]
+fn history_alarms_and_the_line_that_was_driven_outlive_the_process() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("mill.sqlite");
+    let machine = machine("mill-3axis.toml");
+    let mut says = Says::new();
+    let load = says.ask(
+        1000,
+        "load",
+        json!({ "text": WRITES, "name": "writes.ngc" }),
+    );
+    says.ask(10, "start", json!({}));
+    says.ask(6000, "mdi", json!({ "line": "G1 X0 F600" }));
+    says.ask(500, "emergency-stop", json!({}));
+    let alarms = says.ask(3000, "alarms", json!({}));
+    let status = says.ask(1, "status", json!({}));
+    let told = Told::by(&machine, says, |_| (), Box::new(open(&path, &machine)));
+    let alarms = &told.ok(alarms)["alarms"];
+    assert_eq!(
+        (&alarms[0]["code"], alarms.as_array().unwrap().len()),
+        (&json!("emergency-stop"), 1)
+    );
+    assert_eq!(told.ok(status)["alarms"], *alarms);
+    let hash = told.ok(load)["hash"].as_str().unwrap();
+
+    let store = open(&path, &machine);
+    let jobs = store.jobs(10).unwrap();
+    let ends: Vec<_> = jobs
+        .iter()
+        .map(|job| (job.program.as_str(), job.end.as_ref().unwrap().outcome))
+        .collect();
+    assert_eq!(
+        ends,
+        [
+            ("lines by hand", Outcome::EmergencyStop),
+            ("writes.ngc", Outcome::Done)
+        ]
+    );
+    assert_eq!((jobs[1].hash.as_str(), jobs[0].hash.as_str()), (hash, ""));
+    let motion_s = jobs[1].end.as_ref().unwrap().motion_s;
+    assert!((motion_s - 4.04).abs() < 0.1, "{motion_s}");
+    let of_limits: f64 = jobs[1].end.as_ref().unwrap().limited_by_s.values().sum();
+    assert!(of_limits > 3.0, "{of_limits}");
+    let driven = store.load().driven.clone().unwrap();
+    assert_eq!((driven.job, driven.line), (jobs[0].id, 1));
+    assert!(store.load().last_position.is_some());
+
+    // The next process shows them, and an acknowledgement is on disk before its answer.
+    let mut says = Says::new();
+    let history = says.ask(1000, "history", json!({ "count": 1 }));
+    let wrong = says.ask(10, "acknowledge", json!({ "alarm": 99 }));
+    let acknowledge = says.ask(10, "acknowledge", json!({}));
+    let none = says.ask(10, "alarms", json!({}));
+    says.ask(10, "mdi", json!({ "line": "G1 X1 F600" }));
+    let next = says.ask(1000, "history", json!({}));
+    let told = Told::by(&machine, says, |_| (), Box::new(store));
+    let history = told.ok(history);
+    assert_eq!(history["jobs"][0]["outcome"], "emergency-stop");
+    assert_eq!(history["jobs"].as_array().unwrap().len(), 1);
+    assert_eq!(history["driven_before"]["line"], 1);
+    assert!(told.why(wrong).contains("no alarm 99"));
+    assert_eq!(
+        told.ok(acknowledge)["acknowledged"]
+            .as_array()
+            .unwrap()
+            .len(),
+        1
+    );
+    assert_eq!(told.ok(none)["alarms"], json!([]));
+    let numbers: Vec<u64> = told.ok(next)["jobs"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|job| job["number"].as_u64().unwrap())
+        .collect();
+    assert_eq!(numbers, [3, 2, 1], "numbers go on");
+    let alarms = open(&path, &machine).alarms(10).unwrap();
+    assert!(alarms[0].acknowledged_unix_ms.is_some());
+}
+
+/// The driver of the machine fails for good at one of its exchanges, as one does whose bus is gone.
+fn vanishing(name: &str, at_call: u32) -> Machine {
+    machine_with(
+        name,
+        &[(
+            "faults.wrap",
+            &format!("[{{kind = \"fail\", at_call = {at_call}}}]"),
+        )],
+    )
+}
+
+#[test]
+fn a_driver_that_was_lost_is_attached_again_by_a_reset() {
+    let mut says = Says::new();
+    let line = says.ask(1000, "mdi", json!({ "line": "G1 X40 F600" }));
+    let lost = says.ask(3500, "status", json!({}));
+    let refused = says.ask(10, "mdi", json!({ "line": "G1 X1" }));
+    let reset = says.ask(10, "reset", json!({}));
+    let back = says.ask(100, "status", json!({}));
+    let again = says.ask(10, "mdi", json!({ "line": "G1 X0 F1200" }));
+    let there = says.ask(2600, "status", json!({}));
+    // The new attachment counts its own exchanges, and is lost as the first one was.
+    says.ask(10, "mdi", json!({ "line": "G1 X40 F600" }));
+    let lost_again = says.ask(2500, "status", json!({}));
+    let told = Told::by(
+        &vanishing("mill-3axis.toml", 4000),
+        says,
+        |_| (),
+        Box::new(NoKeeper),
+    );
+    told.ok(line);
+    let at = |id: u64| told.ok(id)["position"]["x_mm"].as_f64().unwrap();
+    assert_eq!(told.ok(lost)["state"], "fault");
+    let fault = told.ok(lost)["fault"].as_str().unwrap();
+    assert!(fault.contains("the exchange failed"), "{fault}");
+    assert!(told.why(refused).contains("\"reset\" takes it back"));
+    told.ok(reset);
+    assert_eq!(told.ok(back)["state"], "ready");
+    assert!(
+        at(back) > 20.0 && at(back) < 40.0 && at(back) == at(lost),
+        "{} {}",
+        at(back),
+        at(lost)
+    );
+    told.ok(again);
+    assert_eq!(
+        (told.ok(there)["state"].as_str(), at(there)),
+        (Some("ready"), 0.0)
+    );
+    assert_eq!(told.ok(lost_again)["state"], "fault");
+    let raised = told.events("alarm");
+    assert_eq!(raised.len(), 2, "{raised:?}");
+}
+
+#[test]
+fn homing_is_asked_again_where_the_drives_were_lost_and_not_behind_an_emergency_stop() {
+    let not_homed = |told: &Told, id: u64| told.ok(id)["not_homed"].clone();
+    let mut says = Says::new();
+    let first = says.ask(1000, "status", json!({}));
+    says.ask(10, "home", json!({}));
+    let homed = says.ask(90_000, "status", json!({}));
+    says.ask(10, "emergency-stop", json!({}));
+    says.ask(1000, "reset", json!({}));
+    let stopped = says.ask(1000, "status", json!({}));
+    let told = Told::by(
+        &machine("mill-homing.toml"),
+        says,
+        |_| (),
+        Box::new(NoKeeper),
+    );
+    let all: Value = not_homed(&told, first);
+    assert!(!all.as_array().unwrap().is_empty());
+    assert_eq!(not_homed(&told, homed), json!([]));
+    assert_eq!(
+        not_homed(&told, stopped),
+        json!([]),
+        "the drives have counted on"
+    );
+
+    let mut says = Says::new();
+    says.ask(1000, "home", json!({}));
+    let homed = says.ask(90_000, "status", json!({}));
+    let lost = says.ask(10_000, "status", json!({}));
+    says.ask(10, "reset", json!({}));
+    let back = says.ask(1000, "status", json!({}));
+    let told = Told::by(
+        &vanishing("mill-homing.toml", 95_000),
+        says,
+        |_| (),
+        Box::new(NoKeeper),
+    );
+    assert_eq!(not_homed(&told, homed), json!([]));
+    assert_eq!(told.ok(lost)["state"], "fault");
+    assert_eq!(
+        (told.ok(back)["state"].as_str(), not_homed(&told, back)),
+        (Some("homing-needed"), all)
+    );
+}
+
+#[test]
+fn parameters_of_the_policy_script_are_set_where_it_knows_them_and_last() {
+    let script = examples().join("../../scripts/policies/corner-time-constant.wasm");
+    let script = script.to_str().unwrap();
+    let keys = [
+        ("policy.script", script),
+        ("policy.parameters.corner_error_um", "20"),
+    ];
+    let machine = machine_with("mill-3axis.toml", &keys);
+    let kept = Kept::default();
+    let mut says = Says::new();
+    let name = "corner_error_um";
+    let first = says.ask(100, "policy-parameters", json!({}));
+    let set = says.ask(
+        10,
+        "set-policy-parameter",
+        json!({ "name": name, "value": 30.0 }),
+    );
+    let unknown = says.ask(
+        100,
+        "set-policy-parameter",
+        json!({ "name": "nonsense", "value": 1.0 }),
+    );
+    let last = says.ask(100, "policy-parameters", json!({}));
+    let told = Told::by(&machine, says, |_| (), Box::new(kept.clone()));
+    assert_eq!(told.ok(first)["parameters"], json!({ name: 20.0 }));
+    told.ok(set);
+    assert!(
+        told.why(unknown).contains("nonsense"),
+        "{}",
+        told.why(unknown)
+    );
+    assert_eq!(told.ok(last)["parameters"], json!({ name: 30.0 }));
+    let is_kept = |change: &Change| matches!(change, Change::PolicyParameter { value: 30.0, .. });
+    assert_eq!(
+        kept.1
+            .lock()
+            .unwrap()
+            .iter()
+            .filter(|change| is_kept(change))
+            .count(),
+        1
+    );
+}
