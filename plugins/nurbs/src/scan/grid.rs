@@ -19,6 +19,11 @@ const KNOTS: usize = 2;
 /// but on a grid that is too coarse for it.
 const SLOWER: f64 = 0.85;
 
+/// Share of an axis's acceleration that turning may take: the rows of the grid see to the rest.
+const TURNING: f64 = 0.95;
+/// How much faster than the first timing a knot may be passed, for what is left of the jerk there.
+const FASTER: f64 = 1.4;
+
 /// Intervals at the start of a window in motion with a little more of rate squared, acceleration and jerk.
 const YIELDING: usize = 3;
 const YIELDED: [f64; 3] = [1.0008, 1.006, 1.02];
@@ -31,6 +36,8 @@ struct Place {
     most: f64,
     /// Factor of the speed by slowdowns.
     speed: f64,
+    /// Share of the jerk that a step of acceleration leaves.
+    jerk: f64,
     /// At the start of a window in motion.
     yields: bool,
 }
@@ -170,7 +177,7 @@ impl Grid {
             let state = evaluate(&motion.coefficients, interval, at, motion.step_s);
             let (other, _) = route.at(last[0], &mut cursor);
             let leg = route.find(knot_mm, &mut cursor);
-            let step_cap = Leg::step_cap_mm_per_s(&sides, bounds);
+            let step_cap = Leg::passing_cap_mm_per_s(&sides, bounds);
             let [before, behind] = sides;
             let laid = [
                 (state, before, step_cap),
@@ -179,6 +186,13 @@ impl Grid {
             ];
             let laid =
                 laid.map(|(state, at, cap)| place(leg, bounds, slowdowns, (&state, cap), &at));
+            let mut laid = laid;
+            // The step of acceleration takes its part of the jerk that samples show around the knot.
+            let left = Leg::jerk_left_at_step(&sides, FASTER * state[1], step_cap, bounds);
+            for (point, place) in &mut laid[..2] {
+                place.jerk = left;
+                point.jerk_share *= left;
+            }
             self.between.push(Between {
                 interval,
                 z,
@@ -224,9 +238,9 @@ impl Grid {
             for (point, place) in points.iter_mut().zip(places) {
                 let [speed, jerk] = slowdowns.at(place.s_mm);
                 point.jerk_share = if place.yields {
-                    YIELDED[2] * jerk
+                    YIELDED[2] * place.jerk * jerk
                 } else {
-                    jerk
+                    place.jerk * jerk
                 };
                 point.most = place.most * speed * speed;
                 least = least.min(speed / place.speed);
@@ -258,7 +272,7 @@ fn place(
         point.third[lane] = x3 * s1 * s1 * s1 + 3.0 * x2 * s1 * s2 + x1 * s3;
     }
     let most = if *s1 > 1e-9 {
-        (leg.cap_mm_per_s(at, bounds).min(cap) / s1).powi(2)
+        (leg.turning_cap_mm_per_s(at, bounds, TURNING).min(cap) / s1).powi(2)
     } else {
         f64::INFINITY
     };
@@ -269,6 +283,7 @@ fn place(
             s_mm: *s_mm,
             most,
             speed,
+            jerk: 1.0,
             yields: false,
         },
     )

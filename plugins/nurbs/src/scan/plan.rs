@@ -22,6 +22,8 @@ const HOPELESS: usize = 6;
 /// every limit.
 const SHORT_S: f64 = 0.15;
 const RAMPS_SHARE: f64 = 0.95;
+/// Longest interval of the grid, s, unless three fine periods are longer.
+const MAX_GRID_S: f64 = 5e-3;
 /// Intervals of the grid at least, and at most: a motion slower than that is planned on a coarser one.
 const MIN_INTERVALS: usize = 40;
 const MAX_INTERVALS: usize = 20_000;
@@ -209,7 +211,7 @@ fn grid_s(bounds: &Bounds) -> f64 {
         .map(|a| a.acceleration_mm_per_s2 / a.jerk_mm_per_s3)
         .fold(f64::INFINITY, f64::min);
     let period_s = bounds.context.fine_period_s;
-    (build_up_s / 4.0).clamp(period_s, (3.0 * period_s).max(0.008))
+    (build_up_s / 4.0).clamp(period_s, (3.0 * period_s).max(MAX_GRID_S))
 }
 
 fn lanes(bounds: &Bounds) -> LaneLimits {

@@ -17,6 +17,15 @@ const TURNING: f64 = 0.8;
 const THIRD: f64 = 0.9;
 /// Share of the jerk limit that steps of velocity and acceleration may take in a fine period.
 const STEP: f64 = 0.7;
+/// The same share for a step of acceleration beside which the jerk is held to the rest, before the three quarters of it that
+/// samples show.
+const BEND_STEP: f64 = 1.2;
+/// What a step of acceleration shows as a jerk of samples at most, per period.
+const STEP_SHOWN: f64 = 0.75;
+/// Share of the jerk limit that is the rounding of two derivatives.
+const ROUNDING: f64 = 1e-3;
+/// Share of the jerk limit that is left beside it at least.
+const MIN_LEFT: f64 = 0.1;
 /// Share of the feed below which a junction is not passed but rested at.
 const WORTH: f64 = 0.05;
 /// Largest turn where stretches join without rest, rad: programs round end points of arcs to 0.001 mm.
@@ -104,6 +113,11 @@ impl Leg {
 
     /// Highest speed at a point: feed, chord error, axis speeds and turning.
     pub fn cap_mm_per_s(&self, at: &AlongPath, bounds: &Bounds) -> f64 {
+        self.turning_cap_mm_per_s(at, bounds, TURNING)
+    }
+
+    /// The same, with a share of the acceleration for turning.
+    pub fn turning_cap_mm_per_s(&self, at: &AlongPath, bounds: &Bounds, turning: f64) -> f64 {
         let curvature = self.course.counted_length(&at.curvature);
         let chord = chord_feed_mm_per_s(
             curvature,
@@ -120,7 +134,7 @@ impl Leg {
         for (axis, limits) in bounds.context.limits.axes().iter().enumerate() {
             let bend = at.curvature[axis].abs();
             if bend > 0.0 {
-                cap = cap.min((TURNING * limits.acceleration_mm_per_s2 / bend).sqrt());
+                cap = cap.min((turning * limits.acceleration_mm_per_s2 / bend).sqrt());
             }
         }
         AIM * cap
@@ -139,6 +153,44 @@ impl Leg {
             2.0 * jerk / (turn + (turn * turn + 4.0 * bend * jerk).sqrt())
         });
         caps.fold(f64::INFINITY, f64::min)
+    }
+
+    /// The highest speed where all derivatives are asked for on both sides of a jump: of curvature it may take more of the jerk
+    /// limit, because the jerk beside it is held to what that leaves ([`Leg::jerk_left_at_step`]).
+    pub fn passing_cap_mm_per_s([before, behind]: &[AlongPath; 2], bounds: &Bounds) -> f64 {
+        let period_s = bounds.context.fine_period_s;
+        let axes = bounds.context.limits.axes().iter().enumerate();
+        let caps = axes.map(|(axis, limits)| {
+            let turn = (behind.direction[axis] - before.direction[axis]).abs()
+                / (STEP * period_s * period_s);
+            let bend =
+                (behind.curvature[axis] - before.curvature[axis]).abs() / (BEND_STEP * period_s);
+            let jerk = limits.jerk_mm_per_s3;
+            2.0 * jerk / (turn + (turn * turn + 4.0 * bend * jerk).sqrt())
+        });
+        caps.fold(f64::INFINITY, f64::min)
+    }
+
+    /// Share of the jerk limits that a jump of curvature leaves where it is passed at `speed_mm_per_s`, or at `cap_mm_per_s`
+    /// where that is less: a step Δa of acceleration makes a third difference of 0.75·Δa/T at some phase of the tick.
+    pub fn jerk_left_at_step(
+        [before, behind]: &[AlongPath; 2],
+        speed_mm_per_s: f64,
+        cap_mm_per_s: f64,
+        bounds: &Bounds,
+    ) -> f64 {
+        let v = speed_mm_per_s.min(cap_mm_per_s);
+        let axes = bounds.context.limits.axes().iter().enumerate();
+        let taken = axes.map(|(axis, limits)| {
+            let bend = (behind.curvature[axis] - before.curvature[axis]).abs();
+            STEP_SHOWN * v * v * bend / (bounds.context.fine_period_s * limits.jerk_mm_per_s3)
+        });
+        let taken = taken.fold(0.0, f64::max);
+        if taken > ROUNDING {
+            (1.0 - taken).max(MIN_LEFT)
+        } else {
+            1.0
+        }
     }
 
     /// The same, and the jerk of the curve at that speed.
