@@ -73,14 +73,9 @@ export function historyPanel() {
   const alarms = element("ul", { class: "errors" });
   const fill = async () => {
     try {
-      const told = await machine.link.ask("history");
-      const jobs = [...told.jobs];
-      // The latest stands first, whichever way they come.
-      if (jobs.length > 1 && (jobs[0].started_ms || 0) < (jobs[jobs.length - 1].started_ms || 0)) jobs.reverse();
-      else if (jobs.length && jobs[0].started_ms === undefined) jobs.reverse();
-      list.replaceChildren(...(jobs.length ? jobs.map(job) : [element("li", { class: "hint" }, "Nothing was driven yet.")]));
-      const told_alarms = (told.alarms || []).map((alarm) => element("li", {}, alarm.fault || alarm.words || String(alarm)));
-      alarms.replaceChildren(...told_alarms.slice(-10).reverse());
+      const told = await machine.link.ask("history", { count: 10 });
+      list.replaceChildren(...(told.jobs.length ? told.jobs.map(job) : [element("li", { class: "hint" }, "Nothing was driven yet.")]));
+      alarms.replaceChildren(...told.alarms.map((alarm) => element("li", {}, alarm.text)));
     } catch (error) { say(error.message); }
   };
   machine.on("described", fill);
@@ -89,9 +84,9 @@ export function historyPanel() {
   return element("div", {}, element("h2", {}, "Jobs"), list, element("h2", {}, "Alarms"), alarms);
 }
 
-function job({ name, outcome, time_s, blocks }) {
+function job({ name, outcome, time_s, stops }) {
   const time = Number.isFinite(time_s) ? `${time_s.toFixed(1)} s` : "";
   const words = outcome === "done" ? "" : outcome;
-  return element("li", { class: "row" }, element("span", { class: "grow" }, name), element("small", { class: outcome === "fault" ? "bad" : null }, words),
-    element("small", {}, blocks ? `${blocks} blocks` : ""), element("small", { style: "min-width: 58px; text-align: right" }, time));
+  return element("li", { class: "row" }, element("span", { class: "grow" }, name), element("small", { class: ["fault", "emergency-stop", "lost"].includes(outcome) ? "bad" : null }, words),
+    element("small", {}, stops ? `${stops} stops` : ""), element("small", { style: "min-width: 58px; text-align: right" }, time));
 }
