@@ -50,9 +50,9 @@ pub fn written_out(blocks: &[Block]) -> String {
         };
         let control = match block.path_mode {
             PathMode::ExactStop => "G61.1",
-            _ => "G64",
+            PathMode::Continuous => "G64",
         };
-        let _ = writeln!(text, "{control} {line}");
+        let _ = writeln!(text, "{control}\n{line}");
     }
     text
 }

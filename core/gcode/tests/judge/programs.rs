@@ -234,7 +234,7 @@ pub fn with_o_words(seed: u64) -> String {
 pub fn with_subprograms(seed: u64) -> String {
     let mut writer = Writer::new(seed, 0);
     let count = 1 + writer.below(4);
-    writer.line("O7 (title)\n#1 = 1\n#<_count> = 2");
+    writer.line("O7 (title)\nG0 X0 Y0\n#1 = 1\n#<_count> = 2");
     for number in 0..=count {
         if number > 0 {
             writer.line(&format!("O{:04}", 100 + number));
