@@ -115,3 +115,10 @@ export function echo(page) {
     return most;
   });
 }
+
+// The processes that draw pages and run their scripts: one of the page, and one that the browser keeps in store.
+export async function renderersOf(browser) {
+  const session = await browser.newBrowserCDPSession();
+  const { processInfo } = await session.send("SystemInfo.getProcessInfo");
+  return processInfo.filter((process) => process.type === "renderer").map((process) => process.id);
+}

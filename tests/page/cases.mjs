@@ -2,7 +2,7 @@
 import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
-import { axeSource, browse, check, echo, observer, open, ready, serve, sleep, take, until } from "./bench.mjs";
+import { axeSource, browse, check, echo, observer, open, ready, renderersOf, serve, sleep, take, until } from "./bench.mjs";
 
 const MACHINE = "examples/machines/mill-3axis-smooth.toml";
 const PROGRAMS = ["--programs", "examples/programs"];
@@ -73,10 +73,12 @@ export async function hold() {
     await take(page);
     await watch.ask("status");
     const delays = [];
-    const most = await echo(page);
+    // While the machine moves, as at the click: there is more to draw then.
+    let most = 0;
     for (let i = 0; i < 5; i++) {
-      await page.evaluate(() => window.tandem.link.ask("mdi", { line: `G1 X${100 * (window.side = -(window.side || 1))} F3000` }));
+      await page.evaluate(() => window.tandem.link.ask("mdi", { line: `G1 X${200 * (window.side = -(window.side || 1))} F3000` }));
       await until("it moves", async () => (await watch.ask("status")).feed_mm_per_min > 100);
+      most = Math.max(most, await echo(page));
       await page.evaluate(() => {
         const ask = window.tandem.link.ask.bind(window.tandem.link);
         document.getElementById("hold").addEventListener("click", (event) => { window.clicked = event.timeStamp; }, { once: true, capture: true });
@@ -264,6 +266,27 @@ export async function many() {
   } finally {
     rmSync(folder, { recursive: true, force: true });
   }
+}
+
+// A page that reads nothing for a while loses frames and says so; the machine and other clients go on without it.
+export async function slow() {
+  await inside(MACHINE, async ({ controller, browser, watch }) => {
+    const page = await open(browser, controller.link);
+    await page.waitForFunction(() => window.tandem.scoped);
+    await watch.ask("lease", { how: "take" });
+    await watch.ask("load", { text: `G21 G90 F1500\n${"G1 X20\nG1 X0\n".repeat(40)}M2\n`, name: "to and fro" });
+    await watch.ask("start");
+    await until("it runs", async () => (await watch.ask("status")).state === "running");
+    const renderers = await renderersOf(browser);
+    renderers.forEach((renderer) => process.kill(renderer, "SIGSTOP"));
+    const before = (await watch.ask("status")).tick;
+    await until("ten seconds have passed for the machine", async () => (await watch.ask("status")).tick > before + 10000, 60000);
+    renderers.forEach((renderer) => process.kill(renderer, "SIGCONT"));
+    await until("it is said that frames are lost", async () => (await page.textContent("#scope-lost")).includes("lost"));
+    check((await watch.ask("status")).state === "running", "the machine waited for the page");
+    console.log(await page.textContent("#scope-lost"));
+    clean(page);
+  });
 }
 
 // The pictures of the documentation: node tests/page/run.mjs pictures FOLDER.

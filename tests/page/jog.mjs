@@ -1,6 +1,6 @@
 // A jog ends by itself, whatever becomes of the page whose key is held: what the machine travels behind the event is bounded by the
 // keep-alive, one period, and the way to rest. Where nothing ended it, it would go on to the end of the travel.
-import { browse, check, observer, open, serve, sleep, take, until } from "./bench.mjs";
+import { browse, check, observer, open, renderersOf, serve, sleep, take, until } from "./bench.mjs";
 
 const MACHINE = "examples/machines/mill-3axis.toml";
 const FEED_MM_PER_MIN = 3000;
@@ -77,11 +77,4 @@ export async function jog(name) {
     await browser.close();
     await controller.end();
   }
-}
-
-// The processes that draw pages and run their scripts: one of the page, and one that the browser keeps in store.
-async function renderersOf(browser) {
-  const session = await browser.newBrowserCDPSession();
-  const { processInfo } = await session.send("SystemInfo.getProcessInfo");
-  return processInfo.filter((process) => process.type === "renderer").map((process) => process.id);
 }

@@ -81,5 +81,7 @@ cases! {
     the_software_stop_needs_no_control_and_says_what_to_do: ["stop"];
     every_error_of_a_program_stands_at_its_line: ["errors"];
     a_page_without_the_token_of_this_process_is_refused: ["token"];
+    a_page_that_reads_too_slowly_says_so_and_nobody_waits_for_it: ["slow"];
+    three_hundred_thousand_lines_are_drawn: ["many"];
     nobody_is_kept_out_by_contrast_size_or_the_want_of_a_mouse: ["access"];
 }

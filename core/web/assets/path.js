@@ -9,6 +9,11 @@ const COLOURS = ["faint", "line", "grid", "soft"];
 const [FEED, RAPID, GRID, BOX] = [0, 1, 2, 3];
 const MAX_DRIVEN = 200000;
 const STILL_AFTER_MS = 140;
+// Of more lines than this each is one pixel wide while the view moves, and of more than that always: without a graphics unit the
+// processor draws them.
+const MAX_WIDE_MOVING = 20000, MAX_WIDE = 80000;
+// While a long path comes in, its picture is made now and then.
+const FETCHING_EVERY_MS = 600;
 
 const at = (id) => document.getElementById(id);
 const camera = new Camera();
@@ -135,7 +140,7 @@ async function fetchPath({ generation: now, count, driven_count: drivenCount }) 
     } while (pieces < told.count || drivenFrom < told.driven_count);
     if (told.count === pieces && count > 0 && fittedOf !== generation) { fittedOf = generation; fit(); }
     text("path-note", told.beyond ? `${told.beyond} blocks more are not drawn` : "");
-  } catch { /* asked again with the next status */ } finally { fetching = false; }
+  } catch { /* asked again with the next status */ } finally { fetching = false; draw(); }
 }
 let fittedOf = null;
 
@@ -160,15 +165,18 @@ function take({ axes, from, pieces: all, driven_from: first, driven: places }) {
   draw();
 }
 
-let viewKey = "";
+let viewKey = "", madeAt = 0;
 function drawAll() {
   if (!lines) return;
   const style = getComputedStyle(document.documentElement);
   const css = (name) => style.getPropertyValue("--" + name).trim();
   const isMoving = performance.now() - movedAt < STILL_AFTER_MS;
   const key = [camera.right, camera.up, camera.centre, camera.scale, programmed.clientWidth, programmed.clientHeight, lines.count, isMoving, document.documentElement.dataset.theme].join();
-  if (key !== viewKey) {
-    lines.draw(camera, COLOURS.map((name) => rgba(css(name))), 1.6, isMoving && lines.count > 20000);
+  const now = performance.now();
+  const isDue = !fetching || isMoving || lines.count < MAX_WIDE_MOVING || now - madeAt > FETCHING_EVERY_MS;
+  if (key !== viewKey && isDue) {
+    lines.draw(camera, COLOURS.map((name) => rgba(css(name))), 1.6, lines.count > (isMoving ? MAX_WIDE_MOVING : MAX_WIDE));
+    madeAt = now;
     viewKey = key;
     machine.drawnLines = lines.count;
     drawnTo = 0;

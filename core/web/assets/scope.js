@@ -1,7 +1,7 @@
 // Signals of every fine period, with the limits of the machine as lines. Where the machine stops by a fault the picture stays.
 import { machine, onFrame } from "./machine.js";
 import { showGauge } from "./readouts.js";
-import { element, say } from "./words.js";
+import { element, say, text } from "./words.js";
 
 const MAX_SIGNALS = 8;
 const SPAN_S = 5;
@@ -130,14 +130,18 @@ function limits(u, colour) {
 // Rows of every fine period: differences of the commanded positions are velocity, acceleration and jerk as the drives see them.
 const history = new Map();
 function take({ tick, every, rows, lost: before }) {
-  if (before) lost += before;
+  if (before) {
+    lost += before;
+    text("scope-lost", `${lost} frames lost`);
+    at("scope-lost").title = "This page reads too slowly for all that is told; the machine does not wait for it";
+  }
   const { axes, fine_period_s } = machine.described;
   const seconds = fine_period_s * (every || 1);
   const peaks = axes.map(() => [0, 0, 0]);
   if (previous !== null && tick !== previous) history.clear();
   previous = tick + rows.length * (every || 1);
   const stays = frozen || heldAtFault;
-  rows.forEach((row, at) => {
+  rows.forEach((row, index) => {
     const values = axes.map((axis, place) => {
       const place0 = signals.indexOf(`${axis.axis}_cmd_${axis.unit}`);
       const states = history.get(axis.axis) || [];
@@ -150,7 +154,7 @@ function take({ tick, every, rows, lost: before }) {
       history.set(axis.axis, next);
       return next;
     });
-    if (!stays) keep((tick + at * (every || 1)) * fine_period_s, values, row);
+    if (!stays) keep((tick + index * (every || 1)) * fine_period_s, values, row);
   });
   axes.forEach((axis, place) => peaks[place].forEach((peak, order) => showGauge(axis, order, peak)));
   if (!stays) draw();

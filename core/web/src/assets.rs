@@ -1,5 +1,7 @@
 //! The files of the page: in the binary of a release, and read from the source folder in a debug build.
 
+use std::fmt::Write as _;
+
 use axum::body::Body;
 use axum::http::header::{
     CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, ETAG, IF_NONE_MATCH, REFERRER_POLICY,
@@ -25,7 +27,6 @@ pub fn answer(path: &str, headers: &HeaderMap) -> Response<Body> {
     };
     let mut tag = String::from("\"");
     for byte in &file.metadata.sha256_hash()[..16] {
-        use std::fmt::Write as _;
         // A string takes whatever is written to it.
         let _ = write!(tag, "{byte:02x}");
     }
