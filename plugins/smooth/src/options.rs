@@ -8,8 +8,8 @@ tandem_sdk::options! {
     /// The options. All have defaults that need no change; they exist to see what they do.
     #[derive(Copy)]
     pub struct Options {
-        /// Step of the grid in time, ms: 2 to 20.
-        pub grid_ms: f64 = 6.0,
+        /// Step of the grid in time, ms: 0.5 to 20; with 0 it follows from tolerance, jerk and acceleration.
+        pub grid_ms: f64 = 0.0,
         /// Time that is planned at once, ms: 100 to 2000.
         pub window_ms: f64 = 1000.0,
         /// Share of the tolerance that the first try uses: 0.5 to 1.
@@ -36,7 +36,12 @@ impl Options {
     pub fn check(&self) -> Result<(), PluginError> {
         // The ranges are asked in this form because a comparison with NaN is false.
         let ranges = [
-            ("grid_ms", self.grid_ms, 2.0, 20.0),
+            (
+                "grid_ms",
+                self.grid_ms,
+                if self.grid_ms == 0.0 { 0.0 } else { 0.5 },
+                20.0,
+            ),
             ("window_ms", self.window_ms, 100.0, 2000.0),
             ("tolerance_share", self.tolerance_share, 0.5, 1.0),
             ("rounds", f64::from(self.rounds), 1.0, 8.0),
@@ -72,7 +77,7 @@ mod tests {
         assert_eq!(Options::parse("").unwrap(), Options::default());
         assert_eq!(Options::parse("rounds = 2").unwrap().rounds, 2);
         for (text, word) in [
-            ("grid_ms = 0.5", "grid_ms"),
+            ("grid_ms = 0.4", "grid_ms"),
             ("window_ms = nan", "window_ms"),
             ("tolerance_share = 1.1", "tolerance_share"),
             ("grid_s = 1", "grid_s"),

@@ -6,7 +6,7 @@ use tandem_motion::tube::{Asked, Lanes, Pacer, Place, Smoother, Spline, each};
 use crate::feeds::Feeds;
 use crate::frame::Frame;
 use crate::route::Run;
-use crate::timing::{Mark, Reach, Timing};
+use crate::timing::{FINE_S, Mark, Reach, Timing};
 use crate::travel::Travel;
 use crate::verify::{Checked, Checker};
 use crate::waypoints::{Grid, Keep, Waypoints};
@@ -36,7 +36,7 @@ const GAIN: f64 = 2e-3;
 /// What can be tuned.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tuning {
-    /// Step of the grid, s.
+    /// Step of the grid, s; zero where the path and the limits say it.
     pub step_s: f64,
     /// Time of a window, s.
     pub window_s: f64,
@@ -46,6 +46,44 @@ pub struct Tuning {
     pub rounds: usize,
     /// Rounds more where the window does not pass.
     pub repairs: usize,
+}
+
+/// Step of the grid as a share of the time of a feature.
+const STEP_SHARE: f64 = 0.76;
+/// Steps are multiples of this, s: tolerances that differ by rounding have one grid.
+const ROUND_S: f64 = 0.25e-3;
+/// Shortest and longest step that is taken by itself, s.
+const STEPS_S: (f64, f64) = (1.5e-3, 12e-3);
+/// Steps of a window, without those of the stop at its end.
+const MAX_STEPS: f64 = 300.0;
+
+impl Tuning {
+    /// Step of the grid for a window on `run`, s: where none is stated, a share of the time in which an axis can go the
+    /// tolerance at its limits, which is how long the motion takes around a feature of the path.
+    fn step_s<const L: usize>(
+        &self,
+        run: &Run<'_, L>,
+        frame: &Frame<L>,
+        start: &Start<'_, L>,
+    ) -> f64 {
+        if self.step_s > 0.0 {
+            return self.step_s;
+        }
+        let mut way = 0.0;
+        let mut tolerance = f64::INFINITY;
+        for chord in &run.chords[run.chord_at(start.s, 0)..] {
+            if chord.s > start.end || way > start.window_s {
+                break;
+            }
+            tolerance = chord.tolerance.min(tolerance);
+            way += chord.length / chord.speed.max(1e-9);
+        }
+        let largest = |of: &Lanes<L>| of[..frame.count].iter().copied().fold(0.0, f64::max);
+        let by_jerk_s = (tolerance / largest(&frame.jerk)).cbrt();
+        let by_acceleration_s = (tolerance / largest(&frame.acceleration)).sqrt();
+        let step_s = STEP_SHARE * by_jerk_s.max(by_acceleration_s);
+        (ROUND_S * (step_s / ROUND_S).round()).clamp(STEPS_S.0, STEPS_S.1)
+    }
 }
 
 /// From where a window is planned, and how far.
@@ -102,6 +140,8 @@ pub struct Planning<const L: usize> {
     checker: Checker<L>,
     /// The last round found no rate that keeps all rows.
     infeasible: bool,
+    /// Step of the grid of the present window, s.
+    step_s: f64,
 }
 
 /// What a round takes back.
@@ -132,6 +172,7 @@ impl<const L: usize> Planning<L> {
             times: Vec::new(),
             checker: Checker::default(),
             infeasible: false,
+            step_s: tuning.step_s,
         }
     }
 
@@ -150,6 +191,7 @@ impl<const L: usize> Planning<L> {
     ) -> bool {
         self.effort.windows += 1;
         let counted = frame.counted(run.rotary);
+        self.step_s = self.tuning.step_s(run, frame, start);
         let reach = self.take_over(start);
         self.timing
             .make(run, frame, &counted, &reach, &mut self.marks);
@@ -170,11 +212,12 @@ impl<const L: usize> Planning<L> {
             firm: 1.0,
         };
         let mut before_s = self.marks[self.marks.len() - 1].t;
-        // Without the timing of a window before there is more to be found.
+        // Without the timing of a window before there is more to be found; on a fine grid a round changes less.
+        let rounds = self.tuning.rounds + usize::from(self.step_s < FINE_S);
         let rounds = if start.old.is_none() {
-            2 * self.tuning.rounds
+            2 * rounds
         } else {
-            self.tuning.rounds
+            rounds
         };
         let mut round = 1;
         let mut repairs = 0;
@@ -229,8 +272,9 @@ impl<const L: usize> Planning<L> {
         let mut reach = Reach {
             s: start.s,
             speed: size(&start.state[1]),
-            window_s: start.window_s,
+            window_s: start.window_s.min(MAX_STEPS * self.step_s),
             end: start.end,
+            step_s: self.step_s,
         };
         if let Some((old, now_s)) = start.old {
             let until_s = now_s + WARM * (old.duration_s() - now_s);
@@ -261,8 +305,7 @@ impl<const L: usize> Planning<L> {
         last: bool,
     ) -> bool {
         let total_s = self.marks[self.marks.len() - 1].t;
-        let intervals =
-            ((total_s / self.tuning.step_s).ceil() as usize).clamp(INTERVALS.0, INTERVALS.1);
+        let intervals = ((total_s / self.step_s).ceil() as usize).clamp(INTERVALS.0, INTERVALS.1);
         let grid = Grid {
             intervals,
             step_s: total_s / intervals as f64,
@@ -272,6 +315,11 @@ impl<const L: usize> Planning<L> {
         let ends = (start.s, self.marks[self.marks.len() - 1].s);
         let keep = Keep {
             share: shares.boxes,
+            begin: if start.resting {
+                shares.boxes
+            } else {
+                shares.boxes.max(self.tuning.box_share)
+            },
             travel,
             margin: shares.margin,
             ends,
@@ -446,6 +494,15 @@ impl<const L: usize> Planning<L> {
 /// Share of the tolerance that may lie between two samples before a refused window is to turn more slowly.
 const BULGE: f64 = 0.25;
 
+/// The share of the boxes that leaves room for what lies between samples: that does not become less with them.
+fn narrower(boxes: f64, checked: &Checked) -> f64 {
+    if checked.deviation <= 1.0 {
+        return boxes;
+    }
+    let bulge = checked.bulge.min(0.5);
+    boxes * ((0.97 - bulge) / (checked.deviation - bulge)).clamp(0.7, 0.99)
+}
+
 /// Shares for the next round: what was exceeded, in proportion.
 fn take_back(shares: Shares, checked: &Checked) -> Shares {
     let less = |share: f64, ratio: f64, aim: f64| {
@@ -465,7 +522,7 @@ fn take_back(shares: Shares, checked: &Checked) -> Shares {
         jerk: less(shares.jerk, checked.jerk, 0.998),
         acceleration: slower * less(shares.acceleration, checked.acceleration, 0.998),
         margin: shares.margin + 2.0 * checked.travel.max(0.0),
-        boxes: less(shares.boxes, checked.deviation, 0.96),
+        boxes: narrower(shares.boxes, checked),
         feed: less(shares.feed, checked.speed, 0.9995),
         firm: shares.firm,
     }

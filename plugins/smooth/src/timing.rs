@@ -13,6 +13,9 @@ const GRADED: (f64, f64) = (1e-3, 1.35);
 const LONGEST: f64 = 1.0;
 /// Part of a window's time that the way between two nodes takes at most: a slow window is not longer than it should be.
 const PART: f64 = 0.1;
+/// Where the grid is finer than that, s, nodes lie no farther apart than its steps: boxes are so narrow along the path that they
+/// would hold the motion to the corners of a timing that is a line between two nodes.
+pub const FINE_S: f64 = 4e-3;
 /// Distance below which vertices that are not sharp are no nodes of their own.
 const SHORTEST: f64 = 0.02;
 /// Factor from one speed tried to the next.
@@ -51,6 +54,8 @@ pub struct Reach {
     pub window_s: f64,
     /// The farthest that it may end.
     pub end: f64,
+    /// Step of the grid, s: nodes lie no farther apart.
+    pub step_s: f64,
 }
 
 /// Directions at `s` and a way behind and before it, looked up in chords.
@@ -203,7 +208,13 @@ impl Timing {
             if s >= reach.end || t >= reach.window_s && self.nodes.len() > 8 {
                 return;
             }
-            let longest = (PART * reach.window_s * node.speed).clamp(GRADED.0, LONGEST);
+            let part_s = PART * reach.window_s;
+            let apart_s = if reach.step_s < FINE_S {
+                reach.step_s
+            } else {
+                part_s
+            };
+            let longest = (apart_s * node.speed).clamp(GRADED.0, LONGEST);
             s = next_node(run, &looker, reach, s, longest, &mut ahead, &mut grown);
         }
     }

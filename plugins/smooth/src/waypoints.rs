@@ -18,6 +18,12 @@ const OTHER_FEED: f64 = 0.99;
 const TIMELY_S: f64 = 3e-4;
 /// Half a box along the path at most, as a multiple of the tolerance: where a single axis moves nothing else bounds it.
 const LONGEST: f64 = 150.0;
+/// The same in mm, where that is more: how early or late the motion is on a line has nothing to do with the tolerance.
+const LONGEST_MM: f64 = 1.5;
+/// Share of the tolerance that a box may stand off a path that bends, at its ends along the path.
+const BENT: f64 = 0.2;
+/// Half a box along a path that bends at most, mm; or ten times the tolerance, where that is more.
+const LOOSE_MM: f64 = 0.1;
 /// Steps of the grid in whose way, and in that of the time in which the speed is built up, a box is of use: a slow motion has
 /// next to no jerk, and would go anywhere in a wider one.
 const SWING_STEPS: f64 = 4.0;
@@ -25,6 +31,8 @@ const SWING_STEPS: f64 = 4.0;
 const LONGEST_SWING: f64 = 10.0;
 /// Way over which turns count for the shape of a box, mm.
 const NEAR: f64 = 0.6;
+/// Steps behind the start of a window in motion over which boxes become as narrow as they are to be.
+const BEGINNING: f64 = 8.0;
 /// Firm waypoints in a step at most.
 const DENSEST: f64 = 16.0;
 /// Most waypoints of a window: two lie a sixteenth of a step apart, or between them lie those that fill a gap.
@@ -76,8 +84,10 @@ pub struct Grid {
 /// What is left of the boxes.
 #[derive(Clone, Copy, Debug)]
 pub struct Keep<const L: usize> {
-    /// Share of the tolerance that is used.
+    /// Share of the tolerance that is used, and where the window begins in motion: the state there is given, and a box that
+    /// became narrower beside it would take all the jerk.
     pub share: f64,
+    pub begin: f64,
     /// The ends of the travel, where they are near, and how far inside of them the motion is to stay, in lane units.
     pub travel: Option<Travel<L>>,
     pub margin: f64,
@@ -203,7 +213,9 @@ impl<const L: usize> Waypoints<L> {
         let interval = (place as usize).min(grid.intervals - 1);
         let point = run.chords[candidate.chord as usize].at(candidate.s);
         let mut point = point;
-        let mut half = each(|l| keep.share * half[l]);
+        let begun = (place / BEGINNING).min(1.0);
+        let share = keep.begin + begun * (keep.share - keep.begin);
+        let mut half = each(|l| share * half[l]);
         if let Some(travel) = &keep.travel {
             let way = (candidate.s - keep.ends.0)
                 .min(keep.ends.1 - candidate.s)
@@ -263,6 +275,7 @@ fn half_widths<const L: usize>(run: &Run<'_, L>, candidate: &Candidate<L>, grid:
         mut need,
         sharp_way,
         timely,
+        bend,
     } = needs(run, i, s);
     let most = largest(&need);
     if most > 0.0 {
@@ -286,7 +299,8 @@ fn half_widths<const L: usize>(run: &Run<'_, L>, candidate: &Candidate<L>, grid:
         let size = dot(&need, &need).sqrt();
         return widen(each(|l| need[l] * (BOX_SHARE * tolerance / size)), [1.0; L]);
     };
-    let loose = (0.5 * sharp_way / tolerance).clamp(1.0, 10.0);
+    let straight = (BENT * tolerance / bend.max(1e-12)).sqrt().min(LOOSE_MM);
+    let loose = (0.5 * sharp_way / tolerance).clamp(1.0, (straight / tolerance).max(10.0));
     for l in 0..lanes {
         let t = tangent[l].abs();
         let across = (1.0 - t * t).max(1e-6).sqrt();
@@ -294,8 +308,10 @@ fn half_widths<const L: usize>(run: &Run<'_, L>, candidate: &Candidate<L>, grid:
     }
     let worst = farthest(&need, &tangent);
     widen(
-        each(|l| (need[l] * (BOX_SHARE / worst)).min(LONGEST) * tolerance)
-            .map(|half| half.min(LONGEST_SWING * swing)),
+        each(|l| {
+            (need[l] * (BOX_SHARE / worst)).min(LONGEST.max(LONGEST_MM / tolerance)) * tolerance
+        })
+        .map(|half| half.min(LONGEST_SWING * swing)),
         tangent,
     )
 }
@@ -325,6 +341,8 @@ struct Needs<const L: usize> {
     sharp_way: f64,
     /// How far along the path the motion may be off, so that it is where the feed changes in its time, mm.
     timely: f64,
+    /// How much the path bends at most, 1/mm.
+    bend: f64,
 }
 
 /// What lies around `s`.
@@ -333,11 +351,14 @@ fn needs<const L: usize>(run: &Run<'_, L>, i: usize, s: f64) -> Needs<L> {
     let mut need = [0.0; L];
     let mut sharp_way = f64::INFINITY;
     let mut in_time = f64::INFINITY;
+    let mut bend = 0.0f64;
     let mut look = |v: usize| {
         let turn = minus(&chords[v].direction, &chords[v - 1].direction);
         for l in 0..L {
             need[l] = f64::max(need[l], turn[l].abs());
         }
+        let length = f64::midpoint(chords[v].length, chords[v - 1].length);
+        bend = bend.max(chords[v].turn / length);
         if is_marked(chords, v) {
             let way = (s - chords[v].s).abs();
             sharp_way = sharp_way.min(way);
@@ -363,6 +384,7 @@ fn needs<const L: usize>(run: &Run<'_, L>, i: usize, s: f64) -> Needs<L> {
         need,
         sharp_way: sharp_way.min(run.end() - s),
         timely: in_time,
+        bend,
     }
 }
 

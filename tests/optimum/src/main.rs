@@ -15,9 +15,17 @@ struct Arguments {
     /// Only rows whose name has this in it.
     #[arg(long, default_value = "")]
     row: String,
+    /// An option of the planner, as `grid_ms=3`; may be repeated.
+    #[arg(long = "option", value_parser = key_and_value)]
+    options: Vec<(String, String)>,
     /// A line for each program.
     #[arg(long)]
     each: bool,
+}
+
+fn key_and_value(text: &str) -> Result<(String, String), String> {
+    let (key, value) = text.split_once('=').ok_or("key=value is expected")?;
+    Ok((key.to_string(), value.to_string()))
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -27,7 +35,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         "| row | asked | median | nine tenths | worst | its seed | × real time, median | least | clean |"
     );
     println!("|---|---|---|---|---|---|---|---|---|");
-    for row in rows() {
+    for mut row in rows() {
+        row.mill.options.clone_from(&arguments.options);
         if !row.name.contains(&arguments.row) {
             continue;
         }

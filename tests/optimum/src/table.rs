@@ -138,9 +138,9 @@ impl Row {
             let step_ms = (1000.0 * share * feature_s).clamp(STEP_MS[0], STEP_MS[1]);
             let mut mill = self.mill.clone();
             mill.options = vec![
-                ("grid_ms", format!("{step_ms:.4}")),
-                ("window_ms", "2000".to_string()),
-                ("rounds", "8".to_string()),
+                ("grid_ms".to_string(), format!("{step_ms:.4}")),
+                ("window_ms".to_string(), "2000".to_string()),
+                ("rounds".to_string(), "8".to_string()),
             ];
             let done = driven(text, &mill, folder);
             if done.verdict == "clean" {

@@ -27,7 +27,7 @@ pub struct Mill {
     /// The planner.
     pub planner: &'static str,
     /// Its options.
-    pub options: Vec<(&'static str, String)>,
+    pub options: Vec<(String, String)>,
 }
 
 /// Of each axis, mm/s.

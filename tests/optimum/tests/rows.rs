@@ -1,0 +1,49 @@
+//! A few programs of each row: every limit kept, and no farther from the shortest time than the table says.
+
+use tandem_optimum::table::{median, rows};
+
+/// Programs of a row.
+const COUNT: usize = 6;
+
+/// Largest median and largest ratio of times.
+fn ratios(name: &str) -> (f64, f64) {
+    let folder = tempfile::tempdir().unwrap();
+    let row = rows().into_iter().find(|row| row.name == name).unwrap();
+    let results: Vec<_> = (1000..1100)
+        .filter_map(|seed| row.run(seed, folder.path()))
+        .take(COUNT)
+        .collect();
+    assert_eq!(results.len(), COUNT);
+    for result in &results {
+        assert_eq!(result.verdict, "clean", "{name} {}", result.seed);
+        println!(
+            "{name} {}: {:.4}",
+            result.seed,
+            result.time_s / result.best_s
+        );
+    }
+    let mut ratios: Vec<f64> = results.iter().map(|r| r.time_s / r.best_s).collect();
+    ratios.sort_by(f64::total_cmp);
+    (median(&ratios), ratios[COUNT - 1])
+}
+
+#[test]
+fn smooth_at_a_micrometre_is_near_the_exact_curve() {
+    let (middle, worst) = ratios("smooth-curves-1um");
+    assert!(middle < 1.08 && worst < 1.25, "{middle} {worst}");
+}
+
+#[test]
+fn scan_is_near_the_shortest_time() {
+    for (name, most, most_of_all) in [
+        ("scan-paper", 1.01, 1.03),
+        ("scan-gentle", 1.04, 1.06),
+        ("scan-jumps-gentle", 1.13, 1.25),
+    ] {
+        let (middle, worst) = ratios(name);
+        assert!(
+            middle < most && worst < most_of_all,
+            "{name}: {middle} {worst}"
+        );
+    }
+}
