@@ -5,6 +5,7 @@
 mod attach;
 mod bad_input;
 mod bench;
+mod clients;
 mod clocks;
 mod defective;
 mod disturbances;

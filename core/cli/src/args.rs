@@ -2,6 +2,7 @@
 
 #[cfg(feature = "ethercat")]
 mod bus;
+mod place;
 mod plugin;
 mod state;
 mod trace;
@@ -13,6 +14,7 @@ use clap::{Args as Group, Parser, Subcommand, ValueEnum};
 
 #[cfg(feature = "ethercat")]
 pub use bus::{Bus, Sdo, Which};
+pub use place::{Connect, Place};
 pub use plugin::{Kind, Plugin};
 pub use state::{Files, Of, State};
 pub use trace::Trace;
@@ -127,7 +129,10 @@ pub struct Run {
     /// The part program; - reads it from standard input
     pub program: PathBuf,
     #[command(flatten)]
-    pub machine: Machine,
+    pub place: Place,
+    /// Leave out the lines that begin with /
+    #[arg(long)]
+    pub block_delete: bool,
     /// The clock that drives the loops; without it that of the driver: virtual for simulated drives, wall for real ones
     #[arg(long)]
     pub clock: Option<Clock>,
@@ -234,9 +239,8 @@ pub struct Serve {
 
 #[derive(Group)]
 pub struct Status {
-    /// The controller's socket
-    #[arg(long, value_name = "SOCKET")]
-    pub connect: PathBuf,
+    #[command(flatten)]
+    pub controller: Connect,
     /// Go on, a line whenever it is another
     #[arg(long)]
     pub watch: bool,
@@ -244,9 +248,8 @@ pub struct Status {
 
 #[derive(Group)]
 pub struct Ask {
-    /// The controller's socket
-    #[arg(long, value_name = "SOCKET")]
-    pub connect: PathBuf,
+    #[command(flatten)]
+    pub controller: Connect,
     /// The request, as in mdi, start, home
     pub request: String,
     /// What goes with it, as in line='G0 X5'
@@ -257,7 +260,10 @@ pub struct Ask {
 #[derive(Group)]
 pub struct Mdi {
     #[command(flatten)]
-    pub machine: Machine,
+    pub place: Place,
+    /// Leave out the lines that begin with /
+    #[arg(long)]
+    pub block_delete: bool,
     #[command(flatten)]
     pub session: Session,
 }
@@ -265,7 +271,7 @@ pub struct Mdi {
 #[derive(Group)]
 pub struct Jog {
     #[command(flatten)]
-    pub machine: MachineFile,
+    pub place: Place,
     #[command(flatten)]
     pub session: Session,
 }
@@ -287,7 +293,7 @@ pub struct Check {
 #[derive(Group)]
 pub struct Home {
     #[command(flatten)]
-    pub machine: Machine,
+    pub place: Place,
     /// Reset faults in which drives stand before they are enabled
     #[arg(long)]
     pub reset: bool,

@@ -16,7 +16,7 @@ use crate::{FAULT, args, built_in, clock};
 
 /// Homes the axes of a machine.
 pub fn home(options: &args::Home) -> Result<u8, Box<dyn Error>> {
-    let mut machine = Machine::read(&options.machine.file.path, &options.machine.file.overrides)?;
+    let mut machine = options.place.machine()?;
     if let Some(letter) = options.axis {
         let axis = machine.axes.index(letter.to_ascii_uppercase());
         machine.homing.retain(|homing| Some(homing.axis) == axis);

@@ -20,8 +20,8 @@ mod built_in;
 mod bus;
 mod calibrate;
 mod check;
+mod client;
 mod clock;
-mod connect;
 mod corners;
 mod curves;
 mod estimate;
@@ -63,14 +63,26 @@ fn main() -> ExitCode {
     let command = Args::parse().command;
     hang::arrange();
     let status = match command {
-        Command::Run(options) => run::run(&options),
-        Command::Mdi(options) => mdi::mdi(&options),
-        Command::Jog(options) => jog::jog(&options),
+        Command::Run(options) => match options.place.controller() {
+            Some(at) => client::run(at, &options),
+            None => run::run(&options),
+        },
+        Command::Mdi(options) => match options.place.controller() {
+            Some(at) => client::mdi(at, &options),
+            None => mdi::mdi(&options),
+        },
+        Command::Jog(options) => match options.place.controller() {
+            Some(at) => client::jog(at, &options),
+            None => jog::jog(&options),
+        },
         Command::Check(options) => check::check(&options),
-        Command::Home(options) => home::home(&options),
+        Command::Home(options) => match options.place.controller() {
+            Some(at) => client::home(at, &options),
+            None => home::home(&options),
+        },
         Command::Serve(options) => serve::serve(&options),
-        Command::Status(options) => connect::status(&options),
-        Command::Ask(options) => connect::ask(&options),
+        Command::Status(options) => client::status(&options),
+        Command::Ask(options) => client::ask(&options),
         Command::Estimate(options) => estimate::estimate(&options),
         Command::Calibrate(options) => calibrate::calibrate(&options),
         Command::Identify(options) => identify::identify(&options),

@@ -1,9 +1,11 @@
 //! `tandem run`.
 
 use std::error::Error;
+use std::fmt;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use serde::Deserialize;
 use tandem_host::{
     Clock, HostError, Left, Outcome, Run, RunObserver, StopAnswer, Switches, Timed, parse_commands,
 };
@@ -24,7 +26,7 @@ use crate::{FAULT, REFUSED, args, built_in, clock, hang, operator, program, refu
 
 /// Runs a program.
 pub fn run(options: &args::Run) -> Result<u8, Box<dyn Error>> {
-    let machine = Machine::read(&options.machine.file.path, &options.machine.file.overrides)?;
+    let machine = options.place.machine()?;
     let program = program::open(&options.program)?;
     let name = program.name().to_string();
     let registry = built_in::registry()?;
@@ -71,7 +73,7 @@ fn keys_at_hand(clock: Clock) -> bool {
 fn switches(options: &args::Run, clock: Clock) -> Switches {
     let attended = keys_at_hand(clock) || (clock == Clock::Wall && !options.operator.is_nowhere());
     Switches {
-        block_delete: options.machine.block_delete,
+        block_delete: options.block_delete,
         pause_at_stops: options.pause || (attended && !options.dry),
         optional_stop: options.pause || options.optional_stop,
         dry_run: options.dry,
@@ -84,7 +86,7 @@ fn switches(options: &args::Run, clock: Clock) -> Switches {
 
 /// Refuses to write a file twice, or over what the run reads.
 fn distinct_files(options: &args::Run) -> Result<(), String> {
-    let mut taken = vec![resolved(&options.machine.file.path)];
+    let mut taken = vec![resolved(options.place.path())];
     // Standard input and standard output are both called -.
     taken.extend(
         Some(&options.program)
@@ -417,39 +419,77 @@ fn print_stop(out: &mut impl Write, summary: &Summary, stop: &Stop) -> io::Resul
     )
 }
 
+/// What is said of every run, wherever it was driven: keys of a summary.
+#[derive(Deserialize)]
+pub struct Driven {
+    program: String,
+    machine: String,
+    planner: String,
+    dry_run: bool,
+    blocks: u64,
+    length_mm: f64,
+    motion_time_s: f64,
+    nominal_time_s: f64,
+    time_ratio: Option<f64>,
+    limit_violations: u64,
+    guard_stops: u64,
+    governed_samples: u64,
+    starvations: u64,
+    max_path_deviation_mm: f64,
+}
+
+impl Driven {
+    fn of(summary: &Summary) -> Self {
+        Self {
+            program: summary.program.clone(),
+            machine: summary.machine.clone(),
+            planner: summary.planner.clone(),
+            dry_run: summary.dry_run,
+            blocks: summary.blocks,
+            length_mm: summary.length_mm,
+            motion_time_s: summary.motion_time_s,
+            nominal_time_s: summary.nominal_time_s,
+            time_ratio: summary.time_ratio,
+            limit_violations: summary.limit_violations,
+            guard_stops: summary.guard_stops,
+            governed_samples: summary.governed_samples,
+            starvations: summary.starvations,
+            max_path_deviation_mm: summary.max_path_deviation_mm,
+        }
+    }
+}
+
+impl fmt::Display for Driven {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let dry = if self.dry_run { "dry run of " } else { "" };
+        let ratio = self
+            .time_ratio
+            .map_or_else(String::new, |ratio| format!(", T/T_ref {ratio:.4}"));
+        writeln!(
+            f,
+            "{dry}{}: {} blocks, {:.3} mm in {:.3} s (nominal {:.3} s{ratio}) with {} on {}",
+            self.program,
+            self.blocks,
+            self.length_mm,
+            self.motion_time_s,
+            self.nominal_time_s,
+            self.planner,
+            self.machine
+        )?;
+        writeln!(
+            f,
+            "limit violations {}, guard stops {}, governed samples {}, starvations {}, path deviation {:.3} µm",
+            self.limit_violations,
+            self.guard_stops,
+            self.governed_samples,
+            self.starvations,
+            self.max_path_deviation_mm * 1e3
+        )
+    }
+}
+
 fn print_outcome(out: &mut impl Write, options: &args::Run, summary: &Summary) -> io::Result<()> {
-    let Summary {
-        program,
-        blocks,
-        length_mm,
-        motion_time_s,
-        nominal_time_s,
-        planner,
-        machine,
-        ..
-    } = summary;
-    let dry = if summary.dry_run { "dry run of " } else { "" };
-    let ratio = summary
-        .time_ratio
-        .map_or_else(String::new, |ratio| format!(", T/T_ref {ratio:.4}"));
-    writeln!(
-        out,
-        "{dry}{program}: {blocks} blocks, {length_mm:.3} mm in {motion_time_s:.3} s (nominal {nominal_time_s:.3} s{ratio}) \
-         with {planner} on {machine}"
-    )?;
-    let Summary {
-        limit_violations,
-        guard_stops,
-        governed_samples,
-        starvations,
-        ..
-    } = summary;
-    let deviation_um = summary.max_path_deviation_mm * 1e3;
-    writeln!(
-        out,
-        "limit violations {limit_violations}, guard stops {guard_stops}, governed samples {governed_samples}, \
-         starvations {starvations}, path deviation {deviation_um:.3} µm"
-    )?;
+    write!(out, "{}", Driven::of(summary))?;
     if let Some(timing) = summary.timing() {
         writeln!(out, "{timing}")?;
     }

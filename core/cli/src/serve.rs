@@ -126,15 +126,24 @@ pub fn default_socket(machine: &str) -> PathBuf {
         }
     };
     let name: String = machine.chars().map(plain).take(40).collect();
-    let folder = ["RUNTIME_DIRECTORY", "XDG_RUNTIME_DIR"]
+    let folder = socket_folders().swap_remove(0);
+    folder.join(format!("tandem-{name}.socket"))
+}
+
+/// The folders in which controllers put their sockets: the first is where one of this process does; the last is that of a
+/// service.
+pub fn socket_folders() -> Vec<PathBuf> {
+    let named = ["RUNTIME_DIRECTORY", "XDG_RUNTIME_DIR"];
+    let mut folders: Vec<PathBuf> = named
         .iter()
-        .find_map(|name| {
-            let folder = std::env::var_os(name).map(PathBuf::from)?;
-            folder.is_absolute().then_some(folder)
-        });
-    folder
-        .unwrap_or_else(|| PathBuf::from("/tmp"))
-        .join(format!("tandem-{name}.socket"))
+        .filter_map(|name| std::env::var_os(name).map(PathBuf::from))
+        .filter(|folder| folder.is_absolute())
+        .collect();
+    if folders.is_empty() {
+        folders.push(PathBuf::from("/tmp"));
+    }
+    folders.push(PathBuf::from("/run/tandem"));
+    folders
 }
 
 fn doors(options: &args::Serve, machine: &Machine) -> Listen {
@@ -197,8 +206,16 @@ fn explain(
         say!("  the drives are not enabled: the request \"enable\" does");
     }
     say!("next, in another terminal:");
-    say!("  tandem status --connect {socket}");
-    say!("  tandem ask --connect {socket} mdi line='G0 X5'");
+    // Where its socket lies where one is looked for, nobody has to name it.
+    let (connect, at) = if listen.unix.as_ref() == Some(&default_socket(&machine.name)) {
+        (String::new(), String::new())
+    } else {
+        (format!(" --connect {socket}"), format!(" {socket}"))
+    };
+    say!("  tandem status --watch{connect}");
+    say!("  tandem mdi --connect{at}");
+    say!("  tandem jog --connect{at}");
+    say!("  tandem run PROGRAM --connect{at}");
 }
 
 /// The first signal ends the controller: to rest on the path, drives let go, state written.

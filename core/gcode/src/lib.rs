@@ -67,4 +67,4 @@ pub use item::{Input, InputMode, InputWait, Item, ProbeResult, UserCommand};
 pub use lasting::{Lasting, Ledger, Moment, WORK_SYSTEMS, system_code};
 pub use program::{Program, ProgramError};
 pub use stream::Stream;
-pub use words::docs;
+pub use words::{KnownWord, docs, known_words};

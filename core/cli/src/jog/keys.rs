@@ -34,10 +34,74 @@ enum Key {
     Other,
 }
 
+/// What the keys move: axes of this process, or those of a controller.
+pub trait JogPanel: Send {
+    /// Whether there is an axis of this letter, upper or lower case.
+    fn has_axis(&self, letter: char) -> bool;
+
+    /// Asks for a jog.
+    ///
+    /// # Errors
+    /// Why it is refused, in words.
+    fn jog(&self, jog: JogMessage) -> Result<(), String>;
+
+    /// Lets go of what moves.
+    fn let_go(&self);
+
+    /// Does what a key of any run does; what is said of it.
+    fn command(&self, key: u8) -> Option<String>;
+
+    /// Takes back a fault.
+    fn reset(&self);
+
+    /// Ends the session.
+    fn quit(&self);
+
+    /// Words for the operator.
+    fn say(&self, words: &str);
+}
+
+/// Axes of this process.
+pub struct OwnAxes {
+    pub shared: Arc<Shared>,
+    pub jogs: Arc<JogController>,
+}
+
+impl JogPanel for OwnAxes {
+    fn has_axis(&self, letter: char) -> bool {
+        let axes = &self.jogs.machine().axes;
+        axes.index(letter.to_ascii_uppercase()).is_some()
+    }
+
+    fn jog(&self, jog: JogMessage) -> Result<(), String> {
+        self.jogs.ask(jog.on(&self.jogs.machine().axes)?)
+    }
+
+    fn let_go(&self) {
+        self.jogs.let_go();
+    }
+
+    fn command(&self, key: u8) -> Option<String> {
+        let (hub, stops) = self.shared.hub()?;
+        press(key, &*hub, &stops)
+    }
+
+    fn reset(&self) {
+        self.shared.reset.store(true, Relaxed);
+    }
+
+    fn quit(&self) {
+        self.shared.quit.store(true, Relaxed);
+    }
+
+    fn say(&self, words: &str) {
+        self.shared.say(words);
+    }
+}
+
 /// The keys of a session.
 pub struct JogKeys {
-    shared: Arc<Shared>,
-    jogs: Arc<JogController>,
+    panel: Box<dyn JogPanel>,
     feed: usize,
     /// None: as long as the key is held.
     step: Option<f64>,
@@ -45,10 +109,9 @@ pub struct JogKeys {
 
 impl JogKeys {
     /// Continuous, at a moderate feed.
-    pub fn new(shared: Arc<Shared>, jogs: Arc<JogController>) -> Self {
+    pub fn new(panel: Box<dyn JogPanel>) -> Self {
         Self {
-            shared,
-            jogs,
+            panel,
             feed: FIRST_FEED,
             step: None,
         }
@@ -66,7 +129,7 @@ impl JogKeys {
             match key {
                 Key::Plain(byte) => self.plain(byte),
                 Key::Jog(axis, positive) => self.jog(axis, positive),
-                Key::Other => self.jogs.let_go(),
+                Key::Other => self.panel.let_go(),
             }
         }
     }
@@ -78,28 +141,19 @@ impl JogKeys {
             b'1'..=b'5' => self.choose(Some(STEPS[usize::from(byte - b'1')])),
             b'>' | b'.' => self.faster(1),
             b'<' | b',' => self.faster(-1),
-            b'r' => self.shared.reset.store(true, Relaxed),
-            b'q' => self.shared.quit.store(true, Relaxed),
+            b'r' => self.panel.reset(),
+            b'q' => self.panel.quit(),
             b' ' | b'+' | b'=' | b'-' | b'e' | b'\r' | b'\n' | CTRL_C => self.command(byte),
-            _ if self
-                .jogs
-                .machine()
-                .axes
-                .index(letter.to_ascii_uppercase())
-                .is_some() =>
-            {
+            _ if self.panel.has_axis(letter) => {
                 self.jog(letter.to_ascii_lowercase(), letter.is_ascii_lowercase());
             }
-            _ => self.jogs.let_go(),
+            _ => self.panel.let_go(),
         }
     }
 
     fn command(&self, key: u8) {
-        let Some((hub, stops)) = self.shared.hub() else {
-            return;
-        };
-        if let Some(words) = press(key, &hub, &stops) {
-            self.shared.say(&words);
+        if let Some(words) = self.panel.command(key) {
+            self.panel.say(&words);
         }
     }
 
@@ -114,22 +168,19 @@ impl JogKeys {
             feed_per_min: FEEDS[self.feed],
             degrees: None,
         };
-        let asked = words
-            .on(&self.jogs.machine().axes)
-            .and_then(|jog| self.jogs.ask(jog));
-        if let Err(why) = asked {
-            self.shared.say(&why);
+        if let Err(why) = self.panel.jog(words) {
+            self.panel.say(&why);
         }
     }
 
     fn choose(&mut self, step: Option<f64>) {
         self.step = step;
-        self.shared.say(&self.chosen());
+        self.panel.say(&self.chosen());
     }
 
     fn faster(&mut self, by: isize) {
         self.feed = self.feed.saturating_add_signed(by).min(FEEDS.len() - 1);
-        self.shared.say(&self.chosen());
+        self.panel.say(&self.chosen());
     }
 
     fn chosen(&self) -> String {

@@ -1,8 +1,8 @@
 //! `tandem jog`: single axes by hand.
 
 mod input;
-mod keys;
-mod line;
+pub mod keys;
+pub mod line;
 mod shared;
 
 use std::error::Error;
@@ -22,15 +22,15 @@ use crate::trace::TraceSink;
 use crate::{FAULT, REFUSED, args, built_in};
 
 use input::{Inputs, Script};
-use keys::JogKeys;
+use keys::{JogKeys, OwnAxes};
 use shared::Shared;
 
 /// The word that takes back a fault.
-const RESET: &str = "!reset";
+pub const RESET: &str = "!reset";
 
 /// Jogs until the operator ends it.
 pub fn jog(options: &args::Jog) -> Result<u8, Box<dyn Error>> {
-    let machine = Machine::read(&options.machine.path, &options.machine.overrides)?;
+    let machine = options.place.machine()?;
     let registry = built_in::registry()?;
     let real_time = options.session.clock == args::Clock::Wall;
     let shared = Arc::new(Shared::new(
@@ -101,7 +101,10 @@ pub fn jog(options: &args::Jog) -> Result<u8, Box<dyn Error>> {
 }
 
 fn take_keys(shared: &Arc<Shared>, jogs: &Arc<JogController>) -> Result<Keyboard, String> {
-    let mut panel = JogKeys::new(Arc::clone(shared), Arc::clone(jogs));
+    let mut panel = JogKeys::new(Box::new(OwnAxes {
+        shared: Arc::clone(shared),
+        jogs: Arc::clone(jogs),
+    }));
     panel.explain();
     Keyboard::begin_with(move |bytes| panel.take(bytes))
 }

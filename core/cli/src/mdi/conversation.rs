@@ -30,7 +30,6 @@ pub struct Shared {
 #[derive(Default)]
 struct Inner {
     input: Input,
-    prompted: bool,
     hub: Option<Arc<OperatorHub>>,
     stops: Option<Stops>,
     keyboard: Option<Keyboard>,
@@ -40,17 +39,17 @@ impl Shared {
     /// Nothing said yet.
     pub fn new(real_time: bool, keys: bool) -> Self {
         if keys {
-            say!(
-                "a line of G-code is driven when it is complete; quit, exit or Ctrl-D ends the session"
-            );
-            Keyboard::explain();
+            super::explain();
         }
         Self {
             real_time,
             keys,
             refused: AtomicBool::new(false),
             fault: AtomicBool::new(false),
-            inner: Mutex::default(),
+            inner: Mutex::new(Inner {
+                input: Input::new(keys),
+                ..Inner::default()
+            }),
         }
     }
 
@@ -71,9 +70,7 @@ impl Shared {
         self.fault.store(true, Relaxed);
         loop {
             let mut inner = self.inner();
-            inner.prompt(self.keys);
             let next = inner.input.next(false);
-            inner.prompted &= next == NextLine::Later;
             let is_reset = inner.hub.as_ref().is_some_and(|hub| hub.is_reset());
             drop(inner);
             if is_reset {
@@ -118,17 +115,6 @@ impl Shared {
     }
 }
 
-impl Inner {
-    fn prompt(&mut self, keys: bool) {
-        if keys && !self.prompted {
-            self.prompted = true;
-            let mut out = stdout().lock();
-            // A terminal that has gone away ends the session with its signal.
-            let _ = out.write_all(b"> ").and_then(|()| out.flush());
-        }
-    }
-}
-
 /// Whether a line is a word that ends a session.
 pub fn is_farewell(line: &str) -> bool {
     let word = line.trim();
@@ -154,9 +140,7 @@ impl MdiInput for Conversation {
         if inner.stops.as_ref().is_some_and(Stops::are_asked) {
             return NextLine::Over;
         }
-        inner.prompt(self.shared.keys);
         let next = inner.input.next(!self.shared.real_time);
-        inner.prompted &= next == NextLine::Later;
         match next {
             NextLine::Line(line) if is_farewell(&line) => NextLine::Over,
             NextLine::Line(line) if line.trim() == RESET => {
@@ -176,7 +160,7 @@ impl MdiInput for Conversation {
         let mut inner = self.shared.inner();
         if let (true, Some(hub), Some(stops)) = (self.shared.keys, &inner.hub, &inner.stops) {
             // Without keys the line is driven all the same.
-            inner.keyboard = Keyboard::begin(Arc::clone(hub), stops.clone()).ok();
+            inner.keyboard = Keyboard::begin(hub.clone(), stops.clone()).ok();
         }
     }
 

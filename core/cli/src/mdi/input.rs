@@ -1,49 +1,103 @@
 //! Lines of standard input, one when it is asked for.
 
 use std::io::stdin;
-use std::sync::mpsc::{Receiver, TryRecvError, channel};
+use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 use std::thread;
 
 use tandem_session::NextLine;
 
+use super::editor::LineEditor;
+use crate::operator::{keep_terminal, restore_terminal};
+
 /// Reads a line only while one is asked for, so that keys pressed during motion are nobody's line.
 #[derive(Default)]
 pub struct Input {
-    asked: Option<Receiver<Option<String>>>,
+    reader: Option<Reader>,
+    /// A line is asked for.
+    asked: bool,
     over: bool,
+    /// Lines are typed at a terminal.
+    typed: bool,
+}
+
+/// The thread that reads; it ends with the process where no line comes.
+struct Reader {
+    ask: Sender<()>,
+    read: Receiver<Option<String>>,
 }
 
 impl Input {
+    /// Lines that are `typed` at a terminal, with history and completion, or those of a pipe.
+    pub fn new(typed: bool) -> Self {
+        Self {
+            reader: None,
+            asked: false,
+            over: false,
+            typed,
+        }
+    }
+
     /// The line, if it has come; where it `may_wait`, until it has.
     pub fn next(&mut self, may_wait: bool) -> NextLine {
         if self.over {
             return NextLine::Over;
         }
-        let asked = self.asked.get_or_insert_with(ask);
+        let reader = self.reader.get_or_insert_with(|| reader(self.typed));
+        if !self.asked {
+            self.asked = true;
+            // A reader that is gone says so below.
+            let _ = reader.ask.send(());
+        }
         let read = if may_wait {
-            asked.recv().unwrap_or(None)
+            reader.read.recv().unwrap_or(None)
         } else {
-            match asked.try_recv() {
+            match reader.read.try_recv() {
                 Err(TryRecvError::Empty) => return NextLine::Later,
                 Err(TryRecvError::Disconnected) => None,
                 Ok(read) => read,
             }
         };
-        self.asked = None;
+        self.asked = false;
         self.over = read.is_none();
         read.map_or(NextLine::Over, NextLine::Line)
     }
 }
 
-/// A thread that reads one line; it ends with the process where none comes.
-fn ask() -> Receiver<Option<String>> {
-    let (sender, receiver) = channel();
+impl Drop for Input {
+    fn drop(&mut self) {
+        if self.typed && self.asked {
+            // The editor still has the terminal.
+            restore_terminal();
+        }
+    }
+}
+
+fn reader(typed: bool) -> Reader {
+    let (ask, asked) = channel::<()>();
+    let (sender, read) = channel();
     thread::spawn(move || {
-        let mut line = String::new();
-        let read = stdin().read_line(&mut line).is_ok_and(|bytes| bytes > 0);
-        line.truncate(line.trim_end_matches(['\r', '\n']).len());
-        // Nobody listens any more only where the session is over.
-        let _ = sender.send(read.then_some(line));
+        let mut editor = if typed { LineEditor::new().ok() } else { None };
+        for () in asked {
+            let line = match &mut editor {
+                Some(editor) => {
+                    keep_terminal();
+                    editor.line()
+                }
+                None => plain_line(),
+            };
+            // Nobody listens any more only where the session is over.
+            if sender.send(line).is_err() {
+                return;
+            }
+        }
     });
-    receiver
+    Reader { ask, read }
+}
+
+/// The next line of a pipe.
+fn plain_line() -> Option<String> {
+    let mut line = String::new();
+    let read = stdin().read_line(&mut line).is_ok_and(|bytes| bytes > 0);
+    line.truncate(line.trim_end_matches(['\r', '\n']).len());
+    read.then_some(line)
 }

@@ -1,6 +1,7 @@
 //! `tandem mdi`: manual input.
 
 pub mod conversation;
+mod editor;
 pub mod input;
 
 use std::error::Error;
@@ -12,7 +13,7 @@ use tandem_rings::{Rest, Sample};
 use tandem_session::{HOMING, MdiSession};
 
 use crate::broken::Broken;
-use crate::operator::{Operator, Presence, is_on_terminal};
+use crate::operator::{Keyboard, Operator, Presence, is_on_terminal};
 use crate::trace::TraceSink;
 use crate::warnings::tell_warnings;
 use crate::{FAULT, REFUSED, args, built_in};
@@ -20,17 +21,25 @@ use crate::{FAULT, REFUSED, args, built_in};
 use conversation::{Conversation, Shared};
 
 /// The word that takes back a fault.
-const RESET: &str = "!reset";
+pub const RESET: &str = "!reset";
+
+/// Says how lines are typed at a terminal.
+pub fn explain() {
+    say!(
+        "a line of G-code is driven when it is complete; help says what there is, Tab completes words; quit, exit or Ctrl-D ends the session"
+    );
+    Keyboard::explain();
+}
 
 /// Takes lines until there are no more.
 pub fn mdi(options: &args::Mdi) -> Result<u8, Box<dyn Error>> {
-    let machine = Machine::read(&options.machine.file.path, &options.machine.file.overrides)?;
+    let machine = options.place.machine()?;
     let registry = built_in::registry()?;
     let real_time = options.session.clock == args::Clock::Wall;
     let keys = real_time && is_on_terminal();
     let attended = keys || (real_time && !options.session.operator.is_nowhere());
     let switches = Switches {
-        block_delete: options.machine.block_delete,
+        block_delete: options.block_delete,
         pause_at_stops: attended,
         home: options.session.home.then_some(HOMING),
         reset: options.session.reset,

@@ -7,8 +7,8 @@ use std::thread::{self, JoinHandle};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::stdio;
 use tandem_host::Command;
-use tandem_session::operator::OperatorHub;
 
+use super::panel::{Panel, PanelSwitches};
 use super::signals::Stops;
 use super::tell;
 use super::terminal::RawTerminal;
@@ -40,13 +40,13 @@ impl Keyboard {
     ///
     /// # Errors
     /// The system's words.
-    pub fn begin(hub: Arc<OperatorHub>, stops: Stops) -> Result<Self, String> {
+    pub fn begin(panel: Arc<dyn Panel>, stops: Stops) -> Result<Self, String> {
         Self::begin_with(move |keys| {
             // An arrow or function key is no letter.
             if keys[0] == ESCAPE && keys.len() > 1 {
                 return;
             }
-            for words in keys.iter().filter_map(|key| press(*key, &hub, &stops)) {
+            for words in keys.iter().filter_map(|key| press(*key, &*panel, &stops)) {
                 tell(&words);
             }
         })
@@ -100,45 +100,41 @@ fn listen(mut take: impl FnMut(&[u8]), over: &AtomicBool) {
 }
 
 /// What a key does, and what is said of it.
-pub fn press(key: u8, hub: &OperatorHub, stops: &Stops) -> Option<String> {
-    let controls = hub.controls();
-    let on = |switch: &AtomicBool| switch.load(Ordering::Relaxed);
+pub fn press(key: u8, panel: &dyn Panel, stops: &Stops) -> Option<String> {
+    let switches = panel.switches();
     let (command, words) = match key {
-        b' ' if on(&controls.hold) => (Command::Resume, "resume".to_string()),
+        b' ' if switches.hold => (Command::Resume, "resume".to_string()),
         b' ' => (Command::Hold, "feed hold; space resumes".to_string()),
         b'\r' | b'\n' => (Command::Resume, "on".to_string()),
-        b'+' | b'=' => step(hub, STEP),
-        b'-' => step(hub, -STEP),
+        b'+' | b'=' => step(&switches, STEP),
+        b'-' => step(&switches, -STEP),
         b's' => (
-            Command::SingleBlock(!on(&controls.single_block)),
-            switched("single block", &controls.single_block),
+            Command::SingleBlock(!switches.single_block),
+            switched("single block", switches.single_block),
         ),
         b'o' => (
-            Command::OptionalStop(!on(&controls.optional_stop)),
-            switched("optional stop", &controls.optional_stop),
+            Command::OptionalStop(!switches.optional_stop),
+            switched("optional stop", switches.optional_stop),
         ),
         b'q' => (Command::Abort, "abort: stopping on the path".to_string()),
         b'e' => (Command::EmergencyStop, "emergency stop".to_string()),
-        CTRL_C => return Some(stops.ask(hub)),
+        CTRL_C => return Some(stops.ask(panel)),
         _ => return None,
     };
-    Some(hub.give(command).map_or_else(|refusal| refusal, |_| words))
-}
-
-fn switched(what: &str, switch: &AtomicBool) -> String {
-    format!(
-        "{what} {}",
-        if switch.load(Ordering::Relaxed) {
-            "off"
-        } else {
-            "on"
-        }
+    Some(
+        panel
+            .give(command)
+            .map_or_else(|refusal| refusal, |()| words),
     )
 }
 
+fn switched(what: &str, was_on: bool) -> String {
+    format!("{what} {}", if was_on { "off" } else { "on" })
+}
+
 /// The feed override a step on, within what the machine allows.
-fn step(hub: &OperatorHub, by: f64) -> (Command, String) {
-    let (now, most) = (hub.controls().feed_override.load(), hub.max_feed_ratio());
+fn step(switches: &PanelSwitches, by: f64) -> (Command, String) {
+    let (now, most) = (switches.feed_override, switches.max_feed_ratio);
     // Whole per cents: steps up and down end where they began.
     let asked = ((now + by) * 100.0).round() / 100.0;
     let next = asked.clamp(0.0, most);
@@ -159,6 +155,7 @@ mod tests {
     use std::path::Path;
     use std::sync::atomic::Ordering::Relaxed;
     use tandem_machine::Machine;
+    use tandem_session::operator::OperatorHub;
 
     fn hub() -> OperatorHub {
         let path =

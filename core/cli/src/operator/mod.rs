@@ -2,6 +2,7 @@
 
 mod enter;
 mod keys;
+mod panel;
 mod signals;
 mod terminal;
 
@@ -21,8 +22,9 @@ use crate::args;
 
 use enter::Enter;
 pub use keys::{Keyboard, press};
+pub use panel::{Panel, PanelSwitches};
 pub use signals::{Signals, Stops};
-pub use terminal::{is_on_terminal, restore_terminal};
+pub use terminal::{is_on_terminal, keep_terminal, restore_terminal};
 
 /// How often a program stop is looked after while machine time stands still.
 const LOOK: Duration = Duration::from_millis(5);
@@ -86,13 +88,11 @@ impl Operator {
             keys,
         } = presence;
         let server = serve(options, &hub)?;
-        let signals = real_time
-            .then(|| Signals::catch(Arc::clone(&hub)))
-            .transpose()?;
+        let signals = real_time.then(|| Signals::catch(hub.clone())).transpose()?;
         let stops = signals.as_ref().map(Signals::stops);
         let keyboard = stops
             .filter(|_| keys)
-            .map(|stops| Keyboard::begin(Arc::clone(&hub), stops))
+            .map(|stops| Keyboard::begin(hub.clone(), stops))
             .transpose()?;
         Ok(Self {
             hub,

@@ -8,8 +8,8 @@ use std::thread::{self, JoinHandle};
 use rustix::process::Signal;
 use signal_hook::iterator::{Handle, Signals as Received};
 use tandem_host::Command;
-use tandem_session::operator::OperatorHub;
 
+use super::panel::Panel;
 use super::tell;
 
 /// Signals whose default is to end the process, and that may be sent to one that is whole. In the middle of motion each
@@ -51,8 +51,13 @@ impl Stops {
         self.0.load(Ordering::Relaxed) > 0
     }
 
+    /// The session is to end where nothing moves any more.
+    pub fn end(&self) {
+        self.0.fetch_max(1, Ordering::Relaxed);
+    }
+
     /// Asks once more.
-    pub fn ask(&self, hub: &OperatorHub) -> String {
+    pub fn ask(&self, panel: &dyn Panel) -> String {
         let (command, words) = match self.0.fetch_add(1, Ordering::Relaxed) {
             0 => (
                 Command::Abort,
@@ -61,8 +66,9 @@ impl Stops {
             _ => (Command::EmergencyStop, "emergency stop"),
         };
         // Stopping is never refused.
-        hub.give(command)
-            .map_or_else(|refusal| refusal, |_| words.to_string())
+        panel
+            .give(command)
+            .map_or_else(|refusal| refusal, |()| words.to_string())
     }
 }
 
@@ -78,15 +84,15 @@ impl Signals {
     ///
     /// # Errors
     /// The system's words.
-    pub fn catch(hub: Arc<OperatorHub>) -> Result<Self, String> {
-        Self::catch_with(hub, Stops::default())
+    pub fn catch(panel: Arc<dyn Panel>) -> Result<Self, String> {
+        Self::catch_with(panel, Stops::default())
     }
 
     /// The same, counted on in `stops`.
     ///
     /// # Errors
     /// The system's words.
-    pub fn catch_with(hub: Arc<OperatorHub>, stops: Stops) -> Result<Self, String> {
+    pub fn catch_with(panel: Arc<dyn Panel>, stops: Stops) -> Result<Self, String> {
         let named = STOPS.iter().chain(&IGNORED).map(|signal| signal.as_raw());
         let mut received =
             Received::new(named.chain(REAL_TIME)).map_err(|e| format!("signals: {e}"))?;
@@ -96,7 +102,7 @@ impl Signals {
             let is_ignored =
                 |signal: &i32| IGNORED.iter().any(|ignored| ignored.as_raw() == *signal);
             for _ in received.forever().filter(|signal| !is_ignored(signal)) {
-                tell(&asked.ask(&hub));
+                tell(&asked.ask(&*panel));
             }
         });
         Ok(Self {

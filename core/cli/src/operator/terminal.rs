@@ -20,6 +20,13 @@ pub fn is_on_terminal() -> bool {
 /// How the terminal was before it was taken, while it is.
 static BEFORE: Mutex<Option<Termios>> = Mutex::new(None);
 
+/// Remembers how the terminal is: what takes it from here on may not come to give it back.
+pub fn keep_terminal() {
+    let now = tcgetattr(stdio::stdin()).ok();
+    let mut before = BEFORE.lock().unwrap_or_else(PoisonError::into_inner);
+    *before = before.take().or(now);
+}
+
 /// Gives the terminal back from another thread: the process ends before its time.
 pub fn restore_terminal() {
     let before = BEFORE.lock().unwrap_or_else(PoisonError::into_inner).take();

@@ -334,6 +334,31 @@ pub fn docs() -> String {
     text
 }
 
+/// A G or M word as an operator is told it.
+#[derive(Clone, Copy, Debug)]
+pub struct KnownWord {
+    /// As it is written: `G61.1`.
+    pub code: &'static str,
+    /// What it does.
+    pub meaning: &'static str,
+    /// The letters that it takes, besides F S T N.
+    pub takes: &'static str,
+    /// A line or lines that show its use.
+    pub example: &'static str,
+}
+
+/// The words that work, by letter and number. Allocates.
+pub fn known_words() -> Vec<KnownWord> {
+    let works = |word: &&Word| !matches!(word.action, Action::Refuse(_));
+    let told = |word: &Word| KnownWord {
+        code: word.code,
+        meaning: word.meaning,
+        takes: word.takes,
+        example: word.example,
+    };
+    all().into_iter().filter(works).map(told).collect()
+}
+
 /// For words that need no action of their own: others look whether they stand in the line.
 fn nothing(_line: &mut Line) -> Checked<()> {
     Ok(())

@@ -2,10 +2,23 @@
 
 use serde_json::{Map, Value, json};
 use tandem_gcode::{Lasting, WORK_SYSTEMS, system_code};
+use tandem_host::JobOutcome;
 use tandem_machine::Machine;
 
 use super::states::{ControllerState, judge, requests};
 use crate::operator::Position;
+
+/// What became of a job, where the machine stands, and the job as numbers: a summary without its lists, which may be long.
+/// Allocates.
+pub fn job_event(machine: &Machine, job: &Value, outcome: &JobOutcome) -> Value {
+    let mut summary = serde_json::to_value(&outcome.summary).unwrap_or_default();
+    if let Value::Object(keys) = &mut summary {
+        keys.remove("stops");
+        keys.remove("planning_us");
+    }
+    let position = Position::new(&machine.axes, &outcome.position);
+    json!({ "event": "job", "job": job, "position": position, "summary": summary })
+}
 
 /// The machine as its file says, and which requests are refused in which state, with the reasons. Feeds are per minute, the
 /// rest per second; what is not limited is null. Allocates.

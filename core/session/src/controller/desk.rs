@@ -664,7 +664,7 @@ impl Desk {
                 "number": id, "job": mode.name(), "name": name, "outcome": how.word(), "fault": fault,
                 "blocks": outcome.summary.blocks, "time_s": outcome.summary.motion_time_s, "stopped": outcome.summary.stopped,
             });
-            self.send(None, &json!({ "event": "job", "job": job }));
+            self.send(None, &described::job_event(&self.machine, &job, outcome));
         }
         self.stands(&outcome.position, unknown_axes);
         self.tell_state();

@@ -246,6 +246,8 @@ impl Source for LineSource {
 
     fn provide_input(&mut self, value: f64) {
         let mut inner = lock(&self.0);
+        // It is true now, and lasts behind the job.
+        inner.standing.provide_input(value);
         inner.ahead.provide_input(value);
         inner.asks = false;
     }
@@ -264,10 +266,12 @@ impl Source for LineSource {
                 true
             }
             RestCause::Edge | RestCause::Missed | RestCause::Already => {
-                inner.ahead.provide_probe(&ProbeResult {
+                let found = ProbeResult {
                     touched: rest.latch,
                     rest: rest.position,
-                });
+                };
+                inner.standing.provide_probe(&found);
+                inner.ahead.provide_probe(&found);
                 inner.asks = false;
                 true
             }

@@ -80,7 +80,10 @@ pub fn schema() -> Value {
 /// What clients are told that they have not asked for in this moment.
 pub const EVENTS: [(&str, &str); 12] = [
     ("state", "the machine's state is another one"),
-    ("job", "what became of a job"),
+    (
+        "job",
+        "what became of a job, its summary, and where the machine stands",
+    ),
     ("driven", "the line `id` is driven"),
     ("not-driven", "it is not going to be"),
     (
