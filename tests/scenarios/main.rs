@@ -31,6 +31,7 @@ mod optimal_jerk_stop;
 mod optimal_stop;
 mod overlap;
 mod overrides;
+mod own_machine;
 mod pages;
 mod plan;
 mod plugins;

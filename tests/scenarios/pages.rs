@@ -211,6 +211,7 @@ pages! {
     machining_time: "docs/machining-time.md", 1;
     mdi: "docs/mdi.md", 1;
     nurbs: "docs/nurbs.md", 1;
+    own_machine: "docs/own-machine.md", 3;
     probing: "docs/probing.md", 1;
     simulation: "docs/simulation.md", 4;
     stopping: "docs/stopping.md", 1;

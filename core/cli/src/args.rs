@@ -2,6 +2,7 @@
 
 #[cfg(feature = "ethercat")]
 mod bus;
+mod machine;
 mod place;
 mod plugin;
 mod state;
@@ -14,6 +15,7 @@ use clap::{Args as Group, Parser, Subcommand, ValueEnum};
 
 #[cfg(feature = "ethercat")]
 pub use bus::{Bus, Sdo, Which};
+pub use machine::{Format, ImportMachine, MachineCommand, NewMachine};
 pub use place::{Connect, Place};
 pub use plugin::{Kind, Plugin};
 pub use state::{Files, Of, State};
@@ -73,6 +75,9 @@ pub enum Command {
     /// Look at what lasts of a machine, and exchange it with LinuxCNC
     #[command(subcommand)]
     State(State),
+    /// Write a machine file: from options or answers, or from what another control has
+    #[command(subcommand)]
+    Machine(MachineCommand),
     /// Print what a shell completes on the command line
     Completions {
         /// The shell

@@ -31,6 +31,7 @@ mod home;
 mod identify;
 mod jog;
 mod latency;
+mod machine;
 mod mdi;
 mod operator;
 mod plugin;
@@ -93,6 +94,7 @@ fn main() -> ExitCode {
         Command::Bus(command) => bus::bus(&command),
         Command::Latency(options) => latency::latency(&options),
         Command::State(command) => state::state(&command),
+        Command::Machine(command) => machine::machine(&command),
         Command::Completions { shell } => Ok(generate::completions(shell)),
         Command::Man => generate::man().map_err(Into::into),
     };
