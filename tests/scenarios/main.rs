@@ -40,6 +40,7 @@ mod preparation;
 mod probing;
 mod program_flow;
 mod progress;
+mod python;
 mod random;
 mod random_curves;
 mod record;
