@@ -7,6 +7,7 @@ mod generated;
 mod life_of_a_block;
 mod links;
 mod places;
+mod published;
 mod source;
 mod tree;
 
