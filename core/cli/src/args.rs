@@ -207,6 +207,12 @@ pub struct Serve {
     pub no_state: bool,
     #[command(flatten)]
     pub operator: Operator,
+    /// Let in senders that speak grbl's protocol, over TCP on this computer
+    #[arg(long, value_name = "127.0.0.1:PORT")]
+    pub grbl_tcp: Option<SocketAddr>,
+    /// Let in such senders at a terminal of our own, to which PATH becomes a link
+    #[arg(long, value_name = "PATH")]
+    pub grbl_pty: Option<PathBuf>,
     /// The folder of the programs that clients may load by their path
     #[arg(long, value_name = "FOLDER")]
     pub programs: Option<PathBuf>,

@@ -65,7 +65,7 @@ pub fn serve(options: &args::Serve) -> Result<u8, Box<dyn Error>> {
         explain(
             &machine,
             &listen,
-            controller.address(),
+            [controller.address(), controller.grbl_address()],
             kept_in.as_deref(),
             enabled,
         );
@@ -156,6 +156,8 @@ fn doors(options: &args::Serve, machine: &Machine) -> Listen {
         unix: Some(unix),
         tcp: operator.listen_tcp,
         token_file: operator.token_file.clone(),
+        grbl_tcp: options.grbl_tcp,
+        grbl_pty: options.grbl_pty.clone(),
     }
 }
 
@@ -181,7 +183,7 @@ fn script(path: &Path) -> Result<Vec<ScriptLine>, Box<dyn Error>> {
 fn explain(
     machine: &Machine,
     listen: &Listen,
-    address: Option<std::net::SocketAddr>,
+    [address, grbl_address]: [Option<std::net::SocketAddr>; 2],
     state: Option<&Path>,
     enabled: bool,
 ) {
@@ -196,6 +198,12 @@ fn explain(
     say!("  socket  {socket}");
     if let Some(address) = address {
         say!("  tcp     {address}");
+    }
+    if let Some(address) = grbl_address {
+        say!("  grbl    {address}");
+    }
+    if let Some(path) = &listen.grbl_pty {
+        say!("  grbl    {}", path.display());
     }
     if let Some(path) = state {
         say!("  state   {}", path.display());

@@ -253,6 +253,22 @@ impl Interpreter {
         words
     }
 
+    /// The coolant that is on: M7, M8. Allocates.
+    pub fn coolant_words(&self) -> Vec<&'static str> {
+        let coolant = self.state.coolant;
+        let [mist, flood] = [(coolant.mist, "M7"), (coolant.flood, "M8")];
+        [mist, flood]
+            .into_iter()
+            .filter(|(on, _)| *on)
+            .map(|(_, word)| word)
+            .collect()
+    }
+
+    /// Speed that S has set, rad/s.
+    pub fn spindle_speed_rad_per_s(&self) -> f64 {
+        self.state.spindle.speed_rad_per_s
+    }
+
     /// Feed (F) in force, mm/s; 0 for none.
     pub fn feed_mm_per_s(&self) -> f64 {
         self.state.modes.feed.linear_mm_per_s

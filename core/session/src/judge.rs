@@ -1,9 +1,58 @@
 //! Lines of G-code by hand, judged before anything of them moves.
 
-use tandem_gcode::{Interpreter, Item};
+use std::fmt;
+
+use tandem_gcode::{Diagnostic, Interpreter, Item};
 use tandem_host::check_block;
 use tandem_machine::Machine;
 use tandem_sdk::{NurbsData, Planner};
+
+/// Why a line is refused.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Refusal {
+    /// Short stable name of the error; `planner` where the planner does not take a block of it.
+    pub code: &'static str,
+    /// The cause in words, in one line, without a place.
+    pub cause: String,
+    /// The same with place and text of the line.
+    text: String,
+}
+
+impl Refusal {
+    fn of_planner(number: u32, cause: String) -> Self {
+        Self {
+            code: "planner",
+            text: format!("input:{number}: {cause}"),
+            cause,
+        }
+    }
+
+    /// One that is for people alone.
+    pub fn of(code: &'static str, cause: impl Into<String>) -> Self {
+        let cause = cause.into();
+        Self {
+            code,
+            text: cause.clone(),
+            cause,
+        }
+    }
+}
+
+impl From<Diagnostic> for Refusal {
+    fn from(diagnostic: Diagnostic) -> Self {
+        Self {
+            code: diagnostic.code,
+            text: diagnostic.to_string(),
+            cause: diagnostic.message,
+        }
+    }
+}
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)
+    }
+}
 
 /// Judges lines as the planner and the machine will have to drive them.
 pub struct LineJudge {
@@ -28,14 +77,12 @@ impl LineJudge {
         before: &Interpreter,
         number: u32,
         text: &str,
-    ) -> Result<(Interpreter, Vec<Item>), String> {
+    ) -> Result<(Interpreter, Vec<Item>), Refusal> {
         let (mut tried, mut items) = (before.clone(), vec![]);
-        tried
-            .line(number, text.as_bytes(), &mut items)
-            .map_err(|e| e.to_string())?;
+        tried.line(number, text.as_bytes(), &mut items)?;
         for item in &items {
             self.check(item)
-                .map_err(|why| format!("input:{number}: {why}"))?;
+                .map_err(|why| Refusal::of_planner(number, why))?;
         }
         items.retain(|item| !matches!(item, Item::End));
         tried.go_on();

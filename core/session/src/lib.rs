@@ -4,6 +4,7 @@
 //! answers. The host knows none of them.
 
 pub mod controller;
+pub mod grbl;
 mod homing;
 pub mod jog;
 mod judge;

@@ -138,7 +138,10 @@ struct Manual {
 impl Manual {
     /// Takes a line whose every block can be driven; where it is refused nothing has changed.
     fn interpret(&mut self, text: &str, items: &mut Vec<Item>) -> Result<(), String> {
-        let (behind, judged) = self.judge.judge(&self.interpreter, self.lines, text)?;
+        let (behind, judged) = self
+            .judge
+            .judge(&self.interpreter, self.lines, text)
+            .map_err(|why| why.to_string())?;
         items.extend(judged);
         self.interpreter = behind;
         Ok(())

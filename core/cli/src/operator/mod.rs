@@ -216,6 +216,7 @@ fn serve(options: &args::Operator, hub: &Arc<OperatorHub>) -> Result<Option<Serv
         unix: options.listen.clone(),
         tcp: options.listen_tcp,
         token_file: options.token_file.clone(),
+        ..Listen::default()
     };
     let server = Server::start(Arc::clone(hub), &listen)?;
     if let Some(path) = &options.listen {

@@ -80,6 +80,8 @@ pub enum Order {
         from: From,
     },
     Mdi,
+    /// Lines that are jogs.
+    JogLines,
     Jog,
     Home {
         from: From,
@@ -523,9 +525,11 @@ impl Desk {
                     .ok_or_else(|| missing.to_string())
             }
             "mdi" => {
-                let begins = lock(&self.lines).judge(from.client, from.id, asked.text("line")?)?;
+                let taken = lock(&self.lines)
+                    .judge(from.client, from.id, asked.text("line")?)
+                    .map_err(|why| why.to_string())?;
                 let judged = json!({ "judged": true });
-                let waits = inner.mode == Mode::Mdi || inner.order.is_some() || !begins;
+                let waits = inner.mode == Mode::Mdi || inner.order.is_some() || !taken.begins;
                 Ok(if waits {
                     Acted::Done(judged)
                 } else {
@@ -623,11 +627,13 @@ impl Desk {
     /// A job is over. The loop that drives.
     pub fn finish(&self, mode: Mode, name: &str, outcome: &JobOutcome, unknown_axes: u32) {
         let whole = outcome.fault.is_none() && !outcome.aborted;
+        // A jog that was let go has switched nothing off.
+        let let_go = mode == Mode::Jog && outcome.fault.is_none() && !self.lock().aborting;
         let driven = lock(&self.lines).end_job(
             outcome.position,
             whole,
             whole && mode == Mode::Program,
-            !whole,
+            !whole && !let_go,
         );
         self.tell_driven(&driven, whole);
         let lasting = lock(&self.lines).standing().lasting();

@@ -7,9 +7,10 @@ use tandem_gcode::{Interpreter, Item, Lasting, Ledger, Moment, ProbeResult};
 use tandem_machine::Machine;
 use tandem_rings::{Rest, RestCause};
 use tandem_rough::Source;
-use tandem_sdk::{AxisVector, Planner};
+use tandem_sdk::{AxisVector, Block, BlockKind, EventKind, Planner};
 
-use crate::judge::LineJudge;
+use super::desk::Order;
+use crate::judge::{LineJudge, Refusal};
 use crate::standing::Standing;
 
 /// Lines that may wait before they are planned.
@@ -27,6 +28,10 @@ pub struct Judged {
 }
 
 /// What is true between jobs, and the lines that are read ahead of it. Shared by who judges and who drives.
+#[allow(
+    clippy::struct_excessive_bools,
+    reason = "each is a question of its own about the job"
+)]
 pub struct Lines {
     judge: LineJudge,
     /// Modes, offsets, parameters and tools as the path has made them true.
@@ -45,7 +50,54 @@ pub struct Lines {
     open: bool,
     /// A job of lines is driven, whether it takes more or comes to its end.
     driving: bool,
+    /// The lines are jogs: letting go stops them, and no other lines go with them.
+    jogs: bool,
+    /// What the last probe has found.
+    probed: Option<Probed>,
     stands: Standing,
+}
+
+/// Where a probe has come to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Probed {
+    /// Where it touched, else where the machine came to rest; machine coordinates, mm or rad.
+    pub position: AxisVector,
+    /// Whether it touched.
+    pub touched: bool,
+}
+
+/// What is known of a line that was taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(clippy::struct_excessive_bools, reason = "independent facts of a line")]
+pub struct TakenLine {
+    /// A job is to begin for it.
+    pub begins: bool,
+    /// The machine rests in it or waits: for a time, the operator, an input, or at the end of a program.
+    pub rests: bool,
+    /// It probes.
+    pub asks_probe: bool,
+    /// It ends a program.
+    pub ends: bool,
+}
+
+/// Whether it ends a program.
+fn ends(item: &Item) -> bool {
+    matches!(item, Item::Event(event) if event.kind == EventKind::ProgramEnd)
+}
+
+/// What a line asks for where it does not only move and switch.
+fn rests(item: &Item) -> bool {
+    match item {
+        Item::Block(block, _) => block.kind == BlockKind::Dwell || item.is_probe(),
+        Item::Event(event) => matches!(
+            event.kind,
+            EventKind::ProgramStop
+                | EventKind::OptionalStop
+                | EventKind::ToolChange
+                | EventKind::ProgramEnd
+        ),
+        _ => true,
+    }
 }
 
 /// Shared lines.
@@ -73,8 +125,78 @@ impl Lines {
             asks: false,
             open: false,
             driving: false,
+            jogs: false,
+            probed: None,
             stands: Standing::default(),
         }
+    }
+
+    /// Modes, offsets, parameters and tools behind the last line that was taken.
+    pub fn ahead(&self) -> &Interpreter {
+        if self.is_at_work() {
+            &self.ahead
+        } else {
+            &self.standing
+        }
+    }
+
+    /// Whether lines wait, or are driven.
+    pub fn is_at_work(&self) -> bool {
+        self.driving || !self.waiting.is_empty()
+    }
+
+    /// Whether they are jogs.
+    pub fn are_jogs(&self) -> bool {
+        self.jogs
+    }
+
+    /// How many lines wait for the planner to take them.
+    pub fn count_waiting(&self) -> usize {
+        self.waiting.len()
+    }
+
+    /// Whether a line was taken that the machine has to answer before another one is judged.
+    pub fn awaits_answer(&self) -> bool {
+        self.asks
+    }
+
+    /// What the last probe has found.
+    pub fn probed(&self) -> Option<Probed> {
+        self.probed
+    }
+
+    /// Lines that wait are never driven; what is driven goes on.
+    pub fn forget_waiting(&mut self) {
+        self.waiting.clear();
+        self.asks &= self.driving;
+        if !self.driving {
+            self.ledger.forget();
+            self.judged.clear();
+            self.ahead = self.standing.clone();
+        }
+    }
+
+    /// Modes are as at the start of a program; nothing is driven.
+    pub fn reset_modes(&mut self) {
+        self.standing.reset_modes();
+        self.ahead = self.standing.clone();
+    }
+
+    /// Judges a line behind `before`, and drives nothing.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn check(&self, before: &Interpreter, text: &str) -> Result<Interpreter, Refusal> {
+        let (mut behind, items) = self.judge.judge(before, 1, text)?;
+        if items.iter().any(Item::is_probe) {
+            // Nobody answers: the probe is taken to end where it is programmed to.
+            let rest = behind.position();
+            behind.provide_probe(&ProbeResult {
+                touched: None,
+                rest,
+            });
+        }
+        Ok(behind)
     }
 
     /// Modes, offsets, parameters and tools as they are.
@@ -101,32 +223,98 @@ impl Lines {
         Ok(tried.lasting())
     }
 
-    /// Judges a line and takes it; whether a job is to begin for it.
+    /// Judges a line and takes it.
     ///
     /// # Errors
     /// What is wrong with it: nothing has changed.
-    pub fn judge(&mut self, client: u64, id: u64, text: &str) -> Result<bool, String> {
+    pub fn judge(&mut self, client: u64, id: u64, text: &str) -> Result<TakenLine, Refusal> {
         if self.asks {
-            return Err(
-                "the line before waits for an input or a probe: send this one when it is driven"
-                    .to_string(),
-            );
+            let why =
+                "the line before waits for an input or a probe: send this one when it is driven";
+            return Err(Refusal::of("waits", why));
         }
-        if self.waiting.len() >= MAX_WAITING {
-            return Err(format!(
-                "{MAX_WAITING} lines wait already: send this one when they are driven"
+        if self.jogs && self.is_at_work() {
+            return Err(Refusal::of("jogs", "the machine is jogged"));
+        }
+        let begins = self.prepare()?;
+        let number = self.count + 1;
+        let first_block = self.ahead.next_block();
+        let (tried, items) = self.judge.judge(&self.ahead, number, text)?;
+        self.jogs = false;
+        self.take(client, id, first_block, tried, items, begins)
+    }
+
+    /// Judges a jog, words as of G1 that hold for themselves alone, and takes it.
+    ///
+    /// # Errors
+    /// What is wrong with it: nothing has changed.
+    pub fn judge_jog(
+        &mut self,
+        client: u64,
+        id: u64,
+        words: &str,
+        allows: impl Fn(&AxisVector, &Block) -> Result<(), Refusal>,
+    ) -> Result<TakenLine, Refusal> {
+        if !self.jogs && self.is_at_work() {
+            return Err(Refusal::of(
+                "not-idle",
+                "lines are driven, which are no jogs",
             ));
         }
-        let begins = !self.driving && self.waiting.is_empty();
+        let begins = self.prepare()?;
+        let mut before = self.ahead.clone();
+        before.keep_moments();
+        let modes = before.moment_since(&mut None);
+        let first_block = before.next_block();
+        let text = format!("G94 G1 {words}");
+        let (mut tried, items) = self.judge.judge(&before, self.count + 1, &text)?;
+        let mut at = before.position();
+        for item in &items {
+            if let Item::Block(block, _) = item {
+                allows(&at, block)?;
+                at = block.end;
+            }
+        }
+        if let Some(modes) = modes {
+            tried.take_up(modes);
+        }
+        self.jogs = true;
+        self.take(client, id, first_block, tried, items, begins)
+    }
+
+    /// Sees to it that a line can be judged; whether a job is to begin for it.
+    fn prepare(&mut self) -> Result<bool, Refusal> {
+        if self.waiting.len() >= MAX_WAITING {
+            let why =
+                format!("{MAX_WAITING} lines wait already: send this one when they are driven");
+            return Err(Refusal::of("waits", why));
+        }
+        let begins = !self.is_at_work();
         if begins {
             self.ahead = self.standing.clone();
             self.ahead.number_anew();
             self.ahead.keep_moments();
             (self.count, self.told) = (0, None);
         }
-        let number = self.count + 1;
-        let first_block = self.ahead.next_block();
-        let (mut tried, items) = self.judge.judge(&self.ahead, number, text)?;
+        Ok(begins)
+    }
+
+    #[allow(clippy::unnecessary_wraps, reason = "both ways of judging end with it")]
+    fn take(
+        &mut self,
+        client: u64,
+        id: u64,
+        first_block: u64,
+        mut tried: Interpreter,
+        items: Vec<Item>,
+        begins: bool,
+    ) -> Result<TakenLine, Refusal> {
+        let rests = items.iter().any(rests);
+        let asks_probe = items.iter().any(Item::is_probe);
+        let ends = items.iter().any(ends);
+        if ends {
+            tried.reset_modes();
+        }
         self.asks = items
             .iter()
             .any(|item| matches!(item, Item::Wait(_)) || item.is_probe());
@@ -134,19 +322,42 @@ impl Lines {
             self.ledger.push(first_block, moment);
         }
         self.ahead = tried;
-        self.count = number;
+        self.count += 1;
         self.judged.push_back(Judged {
             client,
             id,
             behind: self.ahead.next_block(),
         });
         self.waiting.push_back(items);
-        Ok(begins)
+        Ok(TakenLine {
+            begins,
+            rests,
+            asks_probe,
+            ends,
+        })
     }
 
-    /// Whether lines wait for a job.
-    pub fn are_waiting(&self) -> bool {
-        !self.waiting.is_empty()
+    /// Takes up the one line that waits, where it drives and switches nothing and nothing is driven: no job is to begin for it.
+    pub fn take_up_at_rest(&mut self) -> bool {
+        let is_empty = self.waiting.front().is_some_and(Vec::is_empty);
+        let alone = !self.driving && self.waiting.len() == 1 && is_empty;
+        if alone {
+            self.waiting.clear();
+            self.judged.clear();
+            self.ledger.reach_all();
+            self.settle();
+        }
+        alone
+    }
+
+    /// What begins a job for lines that wait.
+    pub fn next_order(&self) -> Option<Order> {
+        let order = if self.jogs {
+            Order::JogLines
+        } else {
+            Order::Mdi
+        };
+        (!self.waiting.is_empty()).then_some(order)
     }
 
     /// The path has begun `block`: lines that are driven by now.
@@ -266,6 +477,10 @@ impl Source for LineSource {
                 true
             }
             RestCause::Edge | RestCause::Missed | RestCause::Already => {
+                inner.probed = Some(Probed {
+                    position: rest.latch.unwrap_or(rest.position),
+                    touched: rest.cause == RestCause::Edge,
+                });
                 let found = ProbeResult {
                     touched: rest.latch,
                     rest: rest.position,

@@ -18,8 +18,9 @@ use super::keeper::Keeper;
 use super::lines::{LineSource, Lines, lock};
 use super::path::DrawnPath;
 use super::record::Recording;
+use super::script::{Script, VirtualSender};
 use super::talk::Office;
-use super::watch::{Jogs, Notes, Script, Watch};
+use super::watch::{Jogs, Notes, Watch};
 use crate::HOMING;
 use crate::jog::JogController;
 use crate::operator::{Listen, OperatorHub, Server};
@@ -162,9 +163,13 @@ impl<'r> Controller<'r> {
         let server = if options.listen.is_nowhere() {
             None
         } else {
-            Some(Server::of(Arc::new(Office(Arc::clone(&desk))), &options.listen).map_err(system)?)
+            let office = Office {
+                desk: Arc::clone(&desk),
+                settings: Arc::default(),
+            };
+            Some(Server::of(Arc::new(office), &options.listen).map_err(system)?)
         };
-        let script = Script::of(options.script);
+        let script = Script::new(options.script);
         Ok(Self {
             resident,
             desk,
@@ -181,6 +186,16 @@ impl<'r> Controller<'r> {
         self.server.as_ref().and_then(|server| server.address)
     }
 
+    /// The TCP address of its door for senders of grbl's protocol, likewise.
+    pub fn grbl_address(&self) -> Option<std::net::SocketAddr> {
+        self.server.as_ref().and_then(|server| server.grbl_address)
+    }
+
+    /// On the virtual clock, somebody sends lines as grbl is sent them, until it hangs up. Before the run.
+    pub fn attend(&mut self, sender: Box<dyn VirtualSender>) {
+        self.script.attend(&self.desk, sender);
+    }
+
     /// What ends the controller, for signals: the machine comes to rest on the path, and its drives let go.
     pub fn ender(&self) -> impl Fn() + Send + Sync + 'static {
         let desk = Arc::clone(&self.desk);
@@ -195,11 +210,10 @@ impl<'r> Controller<'r> {
         while !self.desk.is_over() {
             self.desk.tell_state();
             let order = self.desk.lock().order.clone();
-            let order =
-                order.or_else(|| lock(&self.desk.lines).are_waiting().then_some(Order::Mdi));
+            let order = order.or_else(|| lock(&self.desk.lines).next_order());
             match order {
                 Some(order) => self.obey(order, tell)?,
-                None if self.clock == Clock::Virtual && self.script.lines.is_empty() => break,
+                None if self.clock == Clock::Virtual && self.script.is_over() => break,
                 None => {
                     if let Some(words) = self.idle(tell)? {
                         self.desk.fault(&words);
@@ -207,7 +221,8 @@ impl<'r> Controller<'r> {
                 }
             }
         }
-        Script::flush(&self.desk, self.resident.uptime_periods(), self.clock, tell);
+        self.script
+            .flush(&self.desk, self.resident.uptime_periods(), self.clock, tell);
         self.resident.stop(&mut Notes(tell))?;
         let lasting = lock(&self.desk.lines).standing().lasting();
         self.desk.keep(lasting);
@@ -246,6 +261,17 @@ impl<'r> Controller<'r> {
                 };
                 let job = self.resident.source("lines by hand", source, switches);
                 self.drive_or_tell(job, None, Mode::Mdi, "lines by hand", tell)?;
+            }
+            Order::JogLines => {
+                // What let go of the one before is over.
+                self.resident.controls().jog.let_go.store(false, Relaxed);
+                let source = Box::new(LineSource::begin(&self.desk.lines));
+                let switches = Switches {
+                    unhomed: true,
+                    ..self.switches()
+                };
+                let job = self.resident.source("jogging", source, switches);
+                self.drive_or_tell(job, None, Mode::Jog, "jogging", tell)?;
             }
             Order::Jog => {
                 let source = Box::new(Jogs::new(Arc::clone(&self.desk)));

@@ -8,6 +8,7 @@ use serde_json::{Map, Value, json};
 use super::desk::{Desk, From};
 use super::request::{Asked, read};
 use super::words::{Role, word_of};
+use crate::grbl::{Sender, Settings};
 use crate::operator::{Answer, House, Lease, MAX_OWNERS, News, Problem, Talk, is_same};
 
 /// The protocol's number, in the greeting.
@@ -18,12 +19,16 @@ const MAX_STRANGERS_LINE_BYTES: usize = 4096;
 /// Lowest and highest rate of a subscription, Hz.
 const RATES_HZ: std::ops::RangeInclusive<f64> = 0.01..=100.0;
 /// Who lives behind the doors of a controller.
-pub struct Office(pub Arc<Desk>);
+pub struct Office {
+    pub desk: Arc<Desk>,
+    /// How senders of grbl's protocol are told.
+    pub settings: Arc<Settings>,
+}
 
 impl House for Office {
     fn newcomer(&self, number: u64, token: Option<String>) -> Box<dyn Talk> {
         Box::new(Protocol2 {
-            desk: Arc::clone(&self.0),
+            desk: Arc::clone(&self.desk),
             client: number,
             token,
             has_place: true,
@@ -32,18 +37,24 @@ impl House for Office {
         })
     }
 
+    fn sender(&self, number: u64, place: &str) -> Option<Box<dyn Talk>> {
+        let (desk, settings) = (Arc::clone(&self.desk), Arc::clone(&self.settings));
+        let sender = Sender::new(desk, settings, number, place);
+        Some(Box::new(sender.greeted_after(Instant::now())))
+    }
+
     fn set_clients(&self, _count: usize) {}
 
     fn post(&self) -> Vec<(Option<u64>, String)> {
-        self.0.take_post()
+        self.desk.take_post()
     }
 
     fn frames(&self) -> Vec<(u64, String)> {
-        self.0.take_frames()
+        self.desk.take_frames()
     }
 
     fn bell(&self) -> Option<&std::os::unix::net::UnixStream> {
-        Some(self.0.bell())
+        Some(self.desk.bell())
     }
 }
 
@@ -149,7 +160,7 @@ impl Protocol2 {
             let holder = lease
                 .holder()
                 .map_or("nobody holds it".to_string(), |client| {
-                    format!("client {client} holds it")
+                    format!("{} holds it", lease.name_of(client))
                 });
             return Some(Err(format!(
                 "it needs the control lease, and {holder}; stops, hold and what only looks need none"
@@ -173,7 +184,10 @@ impl Protocol2 {
         check(asked)?;
         match asked.text("how")? {
             "take" => lease.take(self.client, now).map_err(|holder| {
-                format!("client {holder} holds it and is asked whether it is there; \"take-over\" takes it now")
+                let holder = lease.name_of(holder);
+                format!(
+                    "{holder} holds it and is asked whether it is there; \"take-over\" takes it now"
+                )
             })?,
             "take-over" => lease.take_over(self.client),
             "release" if lease.release(self.client) => {}

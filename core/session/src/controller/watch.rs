@@ -1,14 +1,13 @@
-//! Who sees what a job does, and the clients of a replay.
+//! Who sees what a job does.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
-use std::time::Instant;
 
-use serde_json::{Value, json};
+use serde_json::json;
 use tandem_gcode::Item;
 use tandem_host::{Clock, RunObserver, StopAnswer};
-use tandem_rings::{Rest, Sample};
+use tandem_rings::{Rest, RestCause, Sample};
 use tandem_rough::Source;
 use tandem_sdk::{AxisVector, Block, BlockReport, Curve, Event};
 use tandem_state::Driven;
@@ -16,65 +15,9 @@ use tandem_state::Driven;
 use super::desk::{Desk, Mode};
 use super::lines::lock;
 use super::record::Recording;
-use super::serve::{ScriptLine, Tell};
-use super::talk::Protocol2;
-use crate::operator::{Lease, Talk};
+use super::script::Script;
+use super::serve::Tell;
 use crate::standing::Standing;
-
-/// Lines of clients by fine periods, on the virtual clock.
-#[derive(Default)]
-pub struct Script {
-    pub lines: VecDeque<ScriptLine>,
-    clients: BTreeMap<u64, Protocol2>,
-    lease: Lease,
-}
-
-impl Script {
-    /// What they say, in the order of the fine periods.
-    pub fn of(lines: Vec<ScriptLine>) -> Self {
-        Self {
-            lines: lines.into(),
-            ..Self::default()
-        }
-    }
-
-    fn say_due(&mut self, desk: &Arc<Desk>, tick: u64, tell: Tell<'_>) {
-        while self.lines.front().is_some_and(|line| line.tick <= tick) {
-            let Some(ScriptLine { client, line, .. }) = self.lines.pop_front() else {
-                return;
-            };
-            let talk = self
-                .clients
-                .entry(client)
-                .or_insert_with(|| Protocol2::known(Arc::clone(desk), client));
-            // Subscriptions live in real time, and are not for replays.
-            let answer = talk.line(&line, &mut self.lease, Instant::now());
-            Self::print(tick, Some(client), &answer.line, tell);
-        }
-    }
-
-    fn print(tick: u64, client: Option<u64>, line: &str, tell: Tell<'_>) {
-        if let Ok(told) = serde_json::from_str::<Value>(line) {
-            tell(&json!({ "tick": tick, "client": client, "told": told }).to_string());
-        }
-    }
-
-    pub fn flush(desk: &Desk, tick: u64, clock: Clock, tell: Tell<'_>) {
-        if clock == Clock::Virtual {
-            for (client, line) in desk.take_post() {
-                Self::print(tick, client, &line, tell);
-            }
-            for (client, frame) in desk.take_frames() {
-                Self::print(
-                    tick,
-                    Some(client),
-                    &super::talk::frame_line(0, &frame),
-                    tell,
-                );
-            }
-        }
-    }
-}
 
 /// Takes notes only.
 pub struct Notes<'a>(pub Tell<'a>);
@@ -161,12 +104,17 @@ impl RunObserver for Watch<'_> {
     }
 
     fn is_attended(&self) -> bool {
-        self.clock == Clock::Wall || !self.script.lines.is_empty()
+        self.clock == Clock::Wall || !self.script.is_over()
     }
 
     fn rest(&mut self, rest: &Rest) {
         self.epoch = u64::from(rest.epoch) + 1;
         self.desk.hub.end_wait();
+        if self.mode == Mode::Jog && rest.cause == RestCause::Abort {
+            // It is let go; else it would be at every rest again.
+            let jog = &self.desk.hub.controls().jog;
+            jog.let_go.store(false, Relaxed);
+        }
     }
 
     fn block(&mut self, block: &Block, curve: Option<Curve<'_>>, report: &BlockReport) {
@@ -246,7 +194,8 @@ impl RunObserver for Watch<'_> {
         }
         self.desk.send_scope(false);
         self.desk.tell_state();
-        Script::flush(self.desk, self.tick, self.clock, self.tell);
+        self.script
+            .flush(self.desk, self.tick, self.clock, self.tell);
     }
 
     fn before_tick(&mut self, uptime_periods: u64) {

@@ -94,6 +94,11 @@ impl Client {
         now.duration_since(self.since)
     }
 
+    /// Who it is, in words.
+    pub fn name(&self) -> String {
+        self.session.name()
+    }
+
     /// The client's number.
     pub fn number(&self) -> u64 {
         self.session.client()
@@ -113,7 +118,8 @@ impl Client {
     pub fn interest(&self) -> (&dyn Stream, PollFlags) {
         let mut flags = PollFlags::empty();
         // One that has said its last word would be ready for reading all the time.
-        flags.set(PollFlags::IN, self.phase != Phase::Leaving);
+        let reads = self.phase != Phase::Leaving && self.session.takes_bytes();
+        flags.set(PollFlags::IN, reads);
         flags.set(PollFlags::OUT, !self.outbox.is_empty());
         (self.stream.as_ref(), flags)
     }
@@ -128,6 +134,10 @@ impl Client {
     pub fn serve(&mut self, lease: &mut Lease, has_place: bool, now: Instant) {
         self.session.set_has_place(has_place);
         self.read(lease, now);
+        if self.phase == Phase::Talking {
+            let line = self.session.turn(lease, now);
+            self.take(&Answer { line, last: false }, now);
+        }
         if self.phase == Phase::Talking && self.session.is_due(now) {
             self.outbox.telemetry(|lost| self.session.telemetry(lost));
         }
@@ -181,6 +191,14 @@ impl Client {
         self.tell(&line, now);
     }
 
+    /// Post of the house.
+    pub fn post(&mut self, line: &str, now: Instant) {
+        let line = self.session.told(line);
+        if !line.is_empty() {
+            self.tell(&line, now);
+        }
+    }
+
     /// A line that it has not asked for.
     pub fn tell(&mut self, line: &str, now: Instant) {
         self.take(
@@ -202,10 +220,17 @@ impl Client {
     }
 
     fn read(&mut self, lease: &mut Lease, now: Instant) {
+        if self.phase == Phase::Talking && !self.session.takes_bytes() {
+            return;
+        }
         let mut chunk = [0; CHUNK];
         // One chunk a round: a client that never stops sending does not keep the others waiting.
         match self.stream.read(&mut chunk) {
             Ok(0) => self.hang_up(now),
+            Ok(count) if self.phase == Phase::Talking && self.session.is_raw() => {
+                let answer = self.session.bytes(&chunk[..count], lease, now);
+                self.take(&answer, now);
+            }
             Ok(count) if self.phase == Phase::Talking => {
                 self.incoming.extend_from_slice(&chunk[..count]);
                 self.lines(lease, now);

@@ -20,6 +20,30 @@ pub trait Talk: Send {
     fn greeting(&self) -> Option<String> {
         None
     }
+    /// Who the client is, in words, as others are told who holds the lease.
+    fn name(&self) -> String {
+        format!("client {}", self.client())
+    }
+    /// Whether the client sends bytes that act one by one, beside lines: then [`Talk::bytes`] takes them.
+    fn is_raw(&self) -> bool {
+        false
+    }
+    /// Whether bytes may be read of a raw client now; what is not read waits with the system.
+    fn takes_bytes(&self) -> bool {
+        true
+    }
+    /// Takes bytes of a raw client.
+    fn bytes(&mut self, _bytes: &[u8], _lease: &mut Lease, _now: Instant) -> Answer {
+        Answer::default()
+    }
+    /// What there is to say though nobody has asked; called once a round.
+    fn turn(&mut self, _lease: &mut Lease, _now: Instant) -> String {
+        String::new()
+    }
+    /// Post of the house as this client reads it.
+    fn told(&mut self, line: &str) -> String {
+        line.to_string()
+    }
     /// Longest line, bytes.
     fn max_line_bytes(&self) -> usize;
     /// Answers a line.
@@ -50,6 +74,10 @@ pub trait Talk: Send {
 pub trait House: Send + Sync {
     /// Somebody has come, whose first line must name `token`.
     fn newcomer(&self, number: u64, token: Option<String>) -> Box<dyn Talk>;
+    /// A sender of grbl's protocol has come, at the door named `place`; none where nobody lives here who speaks it.
+    fn sender(&self, _number: u64, _place: &str) -> Option<Box<dyn Talk>> {
+        None
+    }
     /// So many clients could give commands now.
     fn set_clients(&self, count: usize);
     /// Lines for a client, or for all, that nobody has asked for in this moment.

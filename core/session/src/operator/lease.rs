@@ -1,5 +1,6 @@
 //! Who may give commands.
 
+use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 /// How long a holder may say nothing after another client has asked for the lease.
@@ -12,6 +13,8 @@ pub struct Lease {
     /// Until when the holder must say something, since another client has asked for the lease.
     answer_by: Option<Instant>,
     news: Vec<(u64, News)>,
+    /// Who clients are, in words.
+    names: BTreeMap<u64, String>,
 }
 
 /// What a holder is told without having asked.
@@ -83,5 +86,21 @@ impl Lease {
     /// The client that may.
     pub fn holder(&self) -> Option<u64> {
         self.holder
+    }
+
+    /// Somebody has come, who is called so.
+    pub fn introduce(&mut self, client: u64, name: String) {
+        self.names.insert(client, name);
+    }
+
+    /// A client has gone.
+    pub fn forget(&mut self, client: u64) {
+        self.names.remove(&client);
+    }
+
+    /// Who a client is, in words. Allocates.
+    pub fn name_of(&self, client: u64) -> String {
+        let number = || format!("client {client}");
+        self.names.get(&client).cloned().unwrap_or_else(number)
     }
 }

@@ -6,6 +6,7 @@ use std::os::fd::{AsFd, BorrowedFd};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::PathBuf;
 
+use super::pty::PtyDoor;
 use super::socket_file::{self, SocketFile};
 use super::token;
 
@@ -21,12 +22,19 @@ pub struct Listen {
     pub tcp: Option<SocketAddr>,
     /// File of the token that clients over TCP name.
     pub token_file: Option<PathBuf>,
+    /// Loopback address and port for senders of grbl's protocol, who name no token.
+    pub grbl_tcp: Option<SocketAddr>,
+    /// Path of the link to a terminal of our own, for senders of grbl's protocol.
+    pub grbl_pty: Option<PathBuf>,
 }
 
 impl Listen {
     /// Whether nobody can come.
     pub fn is_nowhere(&self) -> bool {
-        self.unix.is_none() && self.tcp.is_none()
+        self.unix.is_none()
+            && self.tcp.is_none()
+            && self.grbl_tcp.is_none()
+            && self.grbl_pty.is_none()
     }
 }
 
@@ -47,6 +55,8 @@ pub struct Comer {
     pub token: Option<String>,
     /// Whether it runs as another user.
     pub is_guest: bool,
+    /// For a sender of grbl's protocol: the place where it has come in, in words.
+    pub sender_at: Option<String>,
 }
 
 macro_rules! stream {
@@ -76,6 +86,10 @@ pub enum Door {
     ),
     /// Whoever knows the token.
     Tcp(TcpListener, String),
+    /// Senders of grbl's protocol, from this computer.
+    GrblTcp(TcpListener),
+    /// Senders of grbl's protocol that open a terminal whose mode lets the owner in alone.
+    GrblPty(PtyDoor),
 }
 
 impl Door {
@@ -91,6 +105,12 @@ impl Door {
         }
         if let Some(address) = listen.tcp {
             doors.push(tcp(address, listen)?);
+        }
+        if let Some(address) = listen.grbl_tcp {
+            doors.push(Self::GrblTcp(bind(address)?));
+        }
+        if let Some(path) = &listen.grbl_pty {
+            doors.push(Self::GrblPty(PtyDoor::open(path)?));
         }
         Ok(doors)
     }
@@ -110,20 +130,33 @@ impl Door {
                     stream: Box::new(stream),
                     token: None,
                     is_guest,
+                    sender_at: None,
                 })
             }
             Self::Tcp(listener, token) => {
-                let stream = listener.accept()?.0;
-                stream.set_nonblocking(true)?;
-                // Answers are short and wait for nothing.
-                let _ = stream.set_nodelay(true);
-                bound_buffer(&stream);
+                let (stream, _) = comer(listener)?;
                 Ok(Comer {
                     stream: Box::new(stream),
                     token: Some(token.clone()),
                     is_guest: false,
+                    sender_at: None,
                 })
             }
+            Self::GrblTcp(listener) => {
+                let (stream, from) = comer(listener)?;
+                Ok(Comer {
+                    stream: Box::new(stream),
+                    token: None,
+                    is_guest: false,
+                    sender_at: Some(from.to_string()),
+                })
+            }
+            Self::GrblPty(pty) => Ok(Comer {
+                stream: pty.accept()?,
+                token: None,
+                is_guest: false,
+                sender_at: Some(pty.place()),
+            }),
         }
     }
 
@@ -132,19 +165,28 @@ impl Door {
         matches!(self, Self::Tcp(..))
     }
 
-    /// For waiting until a client comes.
-    pub fn fd(&self) -> BorrowedFd<'_> {
+    /// For waiting until a client comes; none where only a look now and then tells.
+    pub fn fd(&self) -> Option<BorrowedFd<'_>> {
         match self {
-            Self::Unix(listener, _) => listener.as_fd(),
-            Self::Tcp(listener, _) => listener.as_fd(),
+            Self::Unix(listener, _) => Some(listener.as_fd()),
+            Self::Tcp(listener, _) | Self::GrblTcp(listener) => Some(listener.as_fd()),
+            Self::GrblPty(_) => None,
         }
     }
 
     /// The TCP address, with the port that the system chose for port 0.
     pub fn address(&self) -> Option<SocketAddr> {
         match self {
-            Self::Unix(..) => None,
             Self::Tcp(listener, _) => listener.local_addr().ok(),
+            _ => None,
+        }
+    }
+
+    /// The TCP address for senders of grbl's protocol, likewise.
+    pub fn grbl_address(&self) -> Option<SocketAddr> {
+        match self {
+            Self::GrblTcp(listener) => listener.local_addr().ok(),
+            _ => None,
         }
     }
 }
@@ -160,21 +202,36 @@ fn bound_buffer(stream: &impl AsFd) {
     let _ = rustix::net::sockopt::set_socket_send_buffer_size(stream, SEND_BUFFER_BYTES);
 }
 
-fn tcp(address: SocketAddr, listen: &Listen) -> Result<Door, String> {
+/// Who waits at `listener`; answers are short and wait for nothing.
+fn comer(listener: &TcpListener) -> io::Result<(TcpStream, SocketAddr)> {
+    let (stream, from) = listener.accept()?;
+    stream.set_nonblocking(true)?;
+    let _ = stream.set_nodelay(true);
+    bound_buffer(&stream);
+    Ok((stream, from))
+}
+
+/// Listens at `address` of this computer.
+fn bind(address: SocketAddr) -> Result<TcpListener, String> {
     if !address.ip().is_loopback() {
         return Err(format!(
             "{address}: operators are let in from this computer alone: 127.0.0.1 or [::1]"
         ));
     }
+    let listening = TcpListener::bind(address).and_then(|listener| {
+        listener.set_nonblocking(true)?;
+        Ok(listener)
+    });
+    listening.map_err(|e| format!("{address}: {e}"))
+}
+
+fn tcp(address: SocketAddr, listen: &Listen) -> Result<Door, String> {
+    let listener = bind(address)?;
     let file = listen
         .token_file
         .as_ref()
         .ok_or("a TCP address needs a token file: anybody on this computer reaches it")?;
     let token = token::of_file(file)?;
-    let listener = TcpListener::bind(address).map_err(|e| format!("{address}: {e}"))?;
-    listener
-        .set_nonblocking(true)
-        .map_err(|e| format!("{address}: {e}"))?;
     Ok(Door::Tcp(listener, token))
 }
 
@@ -186,9 +243,9 @@ mod tests {
     fn tcp_is_for_this_computer_and_needs_a_token() {
         let folder = tempfile::tempdir().unwrap();
         let listen = |address: &str, token: bool| Listen {
-            unix: None,
             tcp: Some(address.parse().unwrap()),
             token_file: token.then(|| folder.path().join("token")),
+            ..Listen::default()
         };
         for elsewhere in ["0.0.0.0:0", "192.168.0.1:5000", "[::]:0"] {
             assert!(

@@ -16,6 +16,7 @@ mod lease;
 mod listen;
 mod outbox;
 mod places;
+mod pty;
 mod reply;
 mod request;
 mod server;

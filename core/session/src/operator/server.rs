@@ -35,6 +35,8 @@ pub struct Server {
     handle: Option<JoinHandle<()>>,
     /// The TCP address, with the port that the system chose for port 0.
     pub address: Option<SocketAddr>,
+    /// The TCP address of the door for senders of grbl's protocol, likewise.
+    pub grbl_address: Option<SocketAddr>,
 }
 
 impl Server {
@@ -53,6 +55,7 @@ impl Server {
     pub(crate) fn of(house: Arc<dyn House>, listen: &Listen) -> Result<Self, String> {
         let doors = Door::open(listen)?;
         let address = doors.iter().find_map(Door::address);
+        let grbl_address = doors.iter().find_map(Door::grbl_address);
         let over = Arc::new(AtomicBool::new(false));
         let mut room = Room::new(house, doors);
         let seen = Arc::clone(&over);
@@ -66,6 +69,7 @@ impl Server {
             over,
             handle: Some(handle),
             address,
+            grbl_address,
         })
     }
 }
@@ -145,6 +149,9 @@ impl Room {
         }
         self.deliver(now);
         self.show_frames(now);
+        for client in self.clients.iter().filter(|client| client.is_gone()) {
+            self.lease.forget(client.number());
+        }
         self.clients.retain(|client| !client.is_gone());
         self.house.set_clients(
             self.clients
@@ -167,7 +174,7 @@ impl Room {
             self.clients
                 .iter_mut()
                 .filter(for_it)
-                .for_each(|client| client.tell(&line, now));
+                .for_each(|client| client.post(&line, now));
         }
     }
 
@@ -203,10 +210,15 @@ impl Room {
                     }
                 };
                 self.comers += 1;
-                let talk = self.house.newcomer(self.comers, comer.token);
+                let talk = match &comer.sender_at {
+                    Some(place) => self.house.sender(self.comers, place),
+                    None => Some(self.house.newcomer(self.comers, comer.token)),
+                };
+                let Some(talk) = talk else { continue };
                 let mut client = Client::new(comer.stream, comer.is_guest, talk, at, now);
                 let standing = client.standing();
                 if has_place(&self.clients, at, standing) {
+                    self.lease.introduce(client.number(), client.name());
                     self.clients.push(client);
                 } else {
                     client.turn_away(&crowded(standing), now);
@@ -227,7 +239,8 @@ impl Room {
             .iter()
             .zip(&self.shut_until)
             .filter(|(_, shut)| shut.is_none());
-        let doors = open.map(|(door, _)| PollFd::from_borrowed_fd(door.fd(), PollFlags::IN));
+        let doors =
+            open.filter_map(|(door, _)| Some(PollFd::from_borrowed_fd(door.fd()?, PollFlags::IN)));
         let clients = self.clients.iter().map(|client| {
             let (stream, flags) = client.interest();
             PollFd::from_borrowed_fd(stream.fd(), flags)

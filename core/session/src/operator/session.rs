@@ -16,7 +16,7 @@ use crate::jog::JogMessage;
 pub const MAX_OWNERS: usize = 16;
 
 /// What a line led to.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Answer {
     /// The line to send.
     pub line: String,

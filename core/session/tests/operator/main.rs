@@ -65,6 +65,7 @@ impl Office {
             unix: Some(folder.path().join("s")),
             tcp: Some("127.0.0.1:0".parse().unwrap()),
             token_file: Some(folder.path().join("token")),
+            ..Listen::default()
         };
         let server = Server::start(Arc::new(hub), &listen).unwrap();
         let token = std::fs::read_to_string(folder.path().join("token"))

@@ -1,0 +1,212 @@
+//! Who speaks to a controller on the virtual clock: lines of a script by their ticks, and senders in this process that answer to
+//! what they hear.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+use tandem_host::Clock;
+
+use super::desk::Desk;
+use super::serve::{ScriptLine, Tell};
+use super::talk::Protocol2;
+use crate::grbl::{Sender, Settings};
+use crate::operator::{Lease, Talk};
+
+/// Senders that came by [`super::Controller::attend`] have numbers from this one on.
+const FIRST_ATTENDED: u64 = 1 << 32;
+
+/// A sender of grbl's protocol in this process, on the virtual clock.
+pub trait VirtualSender: Send {
+    /// A fine period follows, and `heard` was said since the one before. Adds what it says to `say`; `false` where it hangs up.
+    fn period(&mut self, uptime_periods: u64, heard: &str, say: &mut Vec<u8>) -> bool;
+}
+
+struct Attended {
+    number: u64,
+    sender: Box<dyn VirtualSender>,
+}
+
+/// Everybody who speaks.
+pub struct Script {
+    pub lines: VecDeque<ScriptLine>,
+    clients: BTreeMap<u64, Box<dyn Talk>>,
+    attended: Vec<Attended>,
+    /// What senders have heard since they were asked last.
+    heard: BTreeMap<u64, String>,
+    lease: Lease,
+    settings: Arc<Settings>,
+    began: Instant,
+}
+
+impl Script {
+    pub fn new(lines: Vec<ScriptLine>) -> Self {
+        Self {
+            lines: lines.into(),
+            clients: BTreeMap::new(),
+            attended: vec![],
+            heard: BTreeMap::new(),
+            lease: Lease::default(),
+            settings: Arc::default(),
+            began: Instant::now(),
+        }
+    }
+
+    /// Whether nobody has anything left to say.
+    pub fn is_over(&self) -> bool {
+        self.lines.is_empty() && self.attended.is_empty()
+    }
+
+    /// Somebody comes in.
+    pub fn attend(&mut self, desk: &Arc<Desk>, sender: Box<dyn VirtualSender>) {
+        let number = FIRST_ATTENDED + self.attended.len() as u64;
+        self.come(desk, number, true);
+        self.attended.push(Attended { number, sender });
+    }
+
+    fn come(&mut self, desk: &Arc<Desk>, number: u64, sends: bool) -> &mut Box<dyn Talk> {
+        let (lease, settings) = (&mut self.lease, &self.settings);
+        self.clients.entry(number).or_insert_with(|| {
+            let desk = Arc::clone(desk);
+            let talk: Box<dyn Talk> = if sends {
+                let place = "the virtual clock";
+                Box::new(Sender::new(desk, Arc::clone(settings), number, place).greeted())
+            } else {
+                Box::new(Protocol2::known(desk, number))
+            };
+            lease.introduce(number, talk.name());
+            talk
+        })
+    }
+
+    /// Machine time as wall time, so that what lasts for a while lasts as long in every replay.
+    fn now(&self, desk: &Desk, tick: u64) -> Instant {
+        self.began + Duration::from_secs_f64(tick as f64 * desk.machine.fine_period_s)
+    }
+
+    /// What is due before the fine period `tick`.
+    pub fn say_due(&mut self, desk: &Arc<Desk>, tick: u64, tell: Tell<'_>) {
+        let now = self.now(desk, tick);
+        while self.lines.front().is_some_and(|line| line.tick <= tick) {
+            let Some(ScriptLine { client, line, .. }) = self.lines.pop_front() else {
+                return;
+            };
+            let bytes = bytes_of(&line);
+            self.come(desk, client, bytes.is_some());
+            let Some(talk) = self.clients.get_mut(&client) else {
+                return;
+            };
+            let answer = match bytes {
+                Some(bytes) => talk.bytes(&bytes, &mut self.lease, now),
+                None => talk.line(&line, &mut self.lease, now),
+            };
+            self.print(tick, Some(client), &answer.line, tell);
+        }
+        self.ask_attended(desk, tick, now, tell);
+        let raw: Vec<u64> = self
+            .clients
+            .iter()
+            .filter(|(_, talk)| talk.is_raw())
+            .map(|(number, _)| *number)
+            .collect();
+        for number in raw {
+            let Some(talk) = self.clients.get_mut(&number) else {
+                continue;
+            };
+            let said = talk.turn(&mut self.lease, now);
+            self.print(tick, Some(number), &said, tell);
+        }
+    }
+
+    fn ask_attended(&mut self, desk: &Arc<Desk>, tick: u64, now: Instant, tell: Tell<'_>) {
+        let mut said = vec![];
+        let mut gone = vec![];
+        for Attended { number, sender } in &mut self.attended {
+            let heard = self.heard.remove(number).unwrap_or_default();
+            let mut bytes = vec![];
+            let stays = sender.period(tick, &heard, &mut bytes);
+            said.push((*number, bytes));
+            if !stays {
+                gone.push(*number);
+            }
+        }
+        for (number, bytes) in said {
+            if let Some(talk) = self.clients.get_mut(&number).filter(|_| !bytes.is_empty()) {
+                let answer = talk.bytes(&bytes, &mut self.lease, now);
+                self.print(tick, Some(number), &answer.line, tell);
+            }
+        }
+        for number in gone {
+            self.lease.release(number);
+            self.clients.remove(&number);
+            self.attended.retain(|one| one.number != number);
+        }
+        let _ = desk;
+    }
+
+    fn print(&mut self, tick: u64, client: Option<u64>, line: &str, tell: Tell<'_>) {
+        let Some(number) = client else {
+            print(tick, client, line, tell);
+            return;
+        };
+        if line.is_empty() {
+            return;
+        }
+        if number >= FIRST_ATTENDED {
+            self.heard.entry(number).or_default().push_str(line);
+        } else if self.clients.get(&number).is_some_and(|talk| talk.is_raw()) {
+            tell(&json!({ "tick": tick, "client": number, "told": { "grbl": line } }).to_string());
+        } else {
+            print(tick, client, line, tell);
+        }
+    }
+
+    /// Hands out post of the desk.
+    pub fn flush(&mut self, desk: &Desk, tick: u64, clock: Clock, tell: Tell<'_>) {
+        if clock != Clock::Virtual {
+            return;
+        }
+        for (client, line) in desk.take_post() {
+            let for_it = |number: &u64| client.is_none_or(|client| client == *number);
+            let raw: Vec<u64> = self
+                .clients
+                .iter()
+                .filter(|(number, talk)| talk.is_raw() && for_it(number))
+                .map(|(number, _)| *number)
+                .collect();
+            for number in &raw {
+                if let Some(talk) = self.clients.get_mut(number) {
+                    let told = talk.told(&line);
+                    self.print(tick, Some(*number), &told, tell);
+                }
+            }
+            if client.is_none() || raw.is_empty() {
+                print(tick, client, &line, tell);
+            }
+        }
+        for (client, frame) in desk.take_frames() {
+            print(
+                tick,
+                Some(client),
+                &super::talk::frame_line(0, &frame),
+                tell,
+            );
+        }
+    }
+}
+
+fn print(tick: u64, client: Option<u64>, line: &str, tell: Tell<'_>) {
+    if let Ok(told) = serde_json::from_str::<Value>(line) {
+        tell(&json!({ "tick": tick, "client": client, "told": told }).to_string());
+    }
+}
+
+/// The bytes of a sender, where a line has the form `{"grbl":"G1 X1\n"}`: a character a byte.
+fn bytes_of(line: &str) -> Option<Vec<u8>> {
+    let value: Value = serde_json::from_str(line).ok()?;
+    let text = value.get("grbl")?.as_str()?;
+    text.chars()
+        .map(|c| u8::try_from(u32::from(c)).ok())
+        .collect()
+}

@@ -1,0 +1,300 @@
+//! Senders in this process, and the machine that they speak to, on the virtual clock.
+
+use std::collections::VecDeque;
+use std::fmt::Write as _;
+use std::path::Path;
+use std::sync::{Arc, Mutex};
+
+use proptest::prelude::Rng;
+use proptest::test_runner::{RngAlgorithm, TestRng};
+use serde_json::Value;
+use tandem_gcode::Program;
+use tandem_host::{Clock, Registry, Run, Switches};
+use tandem_machine::Machine;
+use tandem_session::controller::{Controller, NoKeeper, Options, ScriptLine, VirtualSender};
+use tandem_session::operator::Listen;
+
+pub fn machine(name: &str, sets: &[(&str, &str)]) -> Machine {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines");
+    let sets: Vec<(String, String)> = sets
+        .iter()
+        .map(|(key, value)| ((*key).to_string(), (*value).to_string()))
+        .collect();
+    Machine::read(&folder.join(name), &sets).unwrap()
+}
+
+pub fn registry() -> Registry {
+    let mut registry = Registry::default();
+    for plugin in [tandem_look_ahead::PLUGIN, tandem_sim::PLUGIN] {
+        registry.register(plugin).unwrap();
+    }
+    registry
+}
+
+pub fn options(script: Vec<ScriptLine>) -> Options {
+    Options {
+        clock: Clock::Virtual,
+        listen: Listen::default(),
+        programs: None,
+        record: None,
+        enable: true,
+        script,
+        uptime_periods: 0,
+        lasting: None,
+    }
+}
+
+/// Lets senders and a script speak to a machine; what everybody but the senders was told.
+pub fn serve(
+    machine: &Machine,
+    senders: Vec<Box<dyn VirtualSender>>,
+    script: Vec<ScriptLine>,
+) -> Vec<Value> {
+    let registry = registry();
+    let mut controller =
+        Controller::open(machine, &registry, options(script), Box::new(NoKeeper)).unwrap();
+    for sender in senders {
+        controller.attend(sender);
+    }
+    let mut told = vec![];
+    controller
+        .run(&mut |line| told.extend(serde_json::from_str(line).ok()))
+        .unwrap();
+    told
+}
+
+/// What happens to a sender: what it heard, line by line, with the tick.
+pub type Log = Arc<Mutex<Vec<(u64, String)>>>;
+
+/// Says bytes at ticks, and hears.
+pub struct Speaker {
+    pub says: VecDeque<(u64, Vec<u8>)>,
+    /// What is said before it speaks is not for it: the machine is being enabled.
+    pub from: u64,
+    pub until: u64,
+    pub log: Log,
+    pub partial: String,
+}
+
+impl Speaker {
+    pub fn new(says: &[(u64, &[u8])], until: u64) -> (Box<Self>, Log) {
+        let log = Log::default();
+        let says = says.iter().map(|(tick, bytes)| (*tick, bytes.to_vec()));
+        let speaker = Self {
+            says: says.clone().collect(),
+            from: says.map(|(tick, _)| tick).min().unwrap_or_default(),
+            until,
+            log: Arc::clone(&log),
+            partial: String::new(),
+        };
+        (Box::new(speaker), log)
+    }
+}
+
+/// Complete lines of what was heard; the rest stays.
+pub fn lines_of(partial: &mut String, heard: &str) -> Vec<String> {
+    partial.push_str(heard);
+    let mut lines = vec![];
+    while let Some(end) = partial.find('\n') {
+        let line: String = partial.drain(..=end).collect();
+        let line = line.trim();
+        if !line.is_empty() {
+            lines.push(line.to_string());
+        }
+    }
+    lines
+}
+
+impl VirtualSender for Speaker {
+    fn period(&mut self, tick: u64, heard: &str, say: &mut Vec<u8>) -> bool {
+        let lines = lines_of(&mut self.partial, heard);
+        let mut log = self.log.lock().unwrap();
+        if tick > self.from {
+            log.extend(lines.into_iter().map(|line| (tick, line)));
+        }
+        while self.says.front().is_some_and(|(at, _)| *at <= tick) {
+            say.extend(self.says.pop_front().unwrap().1);
+        }
+        tick < self.until
+    }
+}
+
+/// What a speaker heard, without its ticks.
+pub fn words(log: &Log) -> Vec<String> {
+    log.lock()
+        .unwrap()
+        .iter()
+        .map(|(_, line)| line.clone())
+        .collect()
+}
+
+/// A field of a status report.
+pub fn field<'a>(report: &'a str, name: &str) -> Option<&'a str> {
+    let inner = report.strip_prefix('<')?.strip_suffix('>')?;
+    inner
+        .split('|')
+        .find_map(|field| field.strip_prefix(name)?.strip_prefix(':'))
+}
+
+pub fn state(report: &str) -> &str {
+    report.trim_start_matches('<').split('|').next().unwrap()
+}
+
+/// The simulated drives hold by this period.
+pub const ENABLED_BY: u64 = 1000;
+
+/// Streams a program by counted characters, as senders do: so many bytes without an answer, a poll now and then.
+pub struct Streamer {
+    pub lines: VecDeque<String>,
+    /// Bytes of each line that is on the way.
+    pub on_the_way: VecDeque<usize>,
+    pub budget: usize,
+    /// Ticks for which nothing is sent, once so many lines are.
+    pub stall: Option<(usize, u64)>,
+    pub stalled_until: u64,
+    pub sent: usize,
+    pub polls_every: u64,
+    pub polled: Option<usize>,
+    pub partial: String,
+    pub seen: Arc<Mutex<Seen>>,
+    pub rng: TestRng,
+}
+
+#[derive(Default)]
+pub struct Seen {
+    pub answers: usize,
+    pub errors: Vec<String>,
+    pub reports: usize,
+    pub first_motion: Option<u64>,
+    pub end: u64,
+    pub lies: Vec<String>,
+}
+
+impl Streamer {
+    pub fn new(
+        text: &str,
+        budget: usize,
+        polls_every: u64,
+        seed: u8,
+    ) -> (Box<Self>, Arc<Mutex<Seen>>) {
+        let seen = Arc::<Mutex<Seen>>::default();
+        let streamer = Self {
+            lines: text.lines().map(|line| format!("{line}\n")).collect(),
+            on_the_way: VecDeque::new(),
+            budget,
+            stall: None,
+            stalled_until: ENABLED_BY,
+            sent: 0,
+            polls_every,
+            polled: None,
+            partial: String::new(),
+            seen: Arc::clone(&seen),
+            rng: TestRng::from_seed(RngAlgorithm::ChaCha, &[seed; 32]),
+        };
+        (Box::new(streamer), seen)
+    }
+
+    pub fn hear(&mut self, tick: u64, line: &str) -> bool {
+        let mut seen = self.seen.lock().unwrap();
+        if line == "ok" || line.starts_with("error:") {
+            seen.answers += 1;
+            if line != "ok" {
+                seen.errors.push(line.to_string());
+            }
+            self.on_the_way.pop_front();
+        } else if line.starts_with('<') {
+            seen.reports += 1;
+            if state(line) == "Run" {
+                seen.first_motion.get_or_insert(tick);
+            }
+            // What is on the way is what is not free, at the moment of the report.
+            let free: usize = field(line, "Bf")
+                .unwrap()
+                .split(',')
+                .nth(1)
+                .unwrap()
+                .parse()
+                .unwrap();
+            if let Some(on_the_way) = self.polled.take()
+                && free + on_the_way != 1024
+            {
+                seen.lies
+                    .push(format!("{line} with {on_the_way} bytes on the way"));
+            }
+            if state(line) == "Idle" && self.lines.is_empty() && self.on_the_way.is_empty() {
+                seen.end = tick;
+                return false;
+            }
+        }
+        true
+    }
+}
+
+impl VirtualSender for Streamer {
+    fn period(&mut self, tick: u64, heard: &str, say: &mut Vec<u8>) -> bool {
+        for line in lines_of(&mut self.partial, heard) {
+            if !self.hear(tick, &line) {
+                return false;
+            }
+        }
+        while tick >= self.stalled_until
+            && let Some(line) = self.lines.front()
+            && self.on_the_way.iter().sum::<usize>() + line.len() <= self.budget
+        {
+            let line = self.lines.pop_front().unwrap();
+            self.on_the_way.push_back(line.len());
+            self.sent += 1;
+            if let Some((at, ticks)) = self.stall
+                && self.sent == at
+            {
+                self.stalled_until = tick + ticks;
+            }
+            // Bytes that act at once stand anywhere.
+            if self.rng.next_u32().is_multiple_of(50) {
+                let at = self.rng.next_u32() as usize % line.len();
+                say.extend_from_slice(&line.as_bytes()[..at]);
+                say.push(0x85);
+                say.extend_from_slice(&line.as_bytes()[at..]);
+            } else {
+                say.extend_from_slice(line.as_bytes());
+            }
+        }
+        if tick.is_multiple_of(self.polls_every) && self.polled.is_none() {
+            say.push(b'?');
+            self.polled = Some(self.on_the_way.iter().sum());
+        }
+        true
+    }
+}
+
+/// Chords of a circle and back, `count` lines.
+pub fn chords(count: usize) -> String {
+    let mut text = String::from("G21 G90 G94 F3000\n");
+    for nth in 1..=count {
+        let angle = nth as f64 / count as f64 * std::f64::consts::TAU * 4.0;
+        // A string takes whatever is written to it.
+        let _ = writeln!(
+            text,
+            "G1X{:.3}Y{:.3}",
+            40.0 * angle.cos() - 40.0,
+            40.0 * angle.sin()
+        );
+    }
+    text
+}
+
+pub fn alone_s(machine: &Machine, text: &str) -> f64 {
+    let program = Program::spool("alone.ngc", text.as_bytes()).unwrap();
+    let run = Run::prepare(machine.clone(), &registry(), program, Switches::default()).unwrap();
+    run.drive(Clock::Virtual, &[], &mut ())
+        .unwrap()
+        .summary
+        .motion_time_s
+}
+
+pub fn jobs(told: &[Value]) -> Vec<&Value> {
+    told.iter()
+        .filter(|told| told["told"]["event"] == "job")
+        .map(|told| &told["told"]["job"])
+        .collect()
+}
