@@ -47,6 +47,7 @@ mod record;
 mod replay;
 mod report;
 mod script;
+mod senders;
 mod signals;
 mod single_block;
 mod smooth;
