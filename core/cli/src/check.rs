@@ -29,7 +29,10 @@ pub fn check(options: &Check) -> Result<u8, Box<dyn Error>> {
         let (lines, blocks, length_mm) = (report.lines, report.blocks, report.length_mm);
         let _ = writeln!(
             std::io::stdout(),
-            "{name}: {lines} lines, {blocks} blocks, {length_mm:.3} mm, no errors"
+            "{name}: {lines} lines, {blocks} blocks, {length_mm:.3} mm, no errors{}",
+            report
+                .seen_to
+                .map_or(String::new(), |line| format!(" up to line {line}"))
         );
         if report.open_lines > 0 {
             let open = report.open_lines;

@@ -8,6 +8,7 @@ use tandem_sdk::AxisVector;
 use crate::config::Config;
 use crate::diagnostic::{Diagnostic, Severity};
 use crate::fault::{Checked, Fault, Span};
+use crate::flow::{by_hand, o_word};
 use crate::item::{Item, ProbeResult};
 use crate::line::Line;
 use crate::state::State;
@@ -164,6 +165,18 @@ impl Interpreter {
         Some((jump, self.reads_assumed.get()))
     }
 
+    /// What was called by hand is over: what belongs to a program is again as `before` the call.
+    pub(crate) fn end_by_hand(&mut self, before: &Self) {
+        self.parameters.leave_all();
+        self.state.saved.leave_all();
+        self.state.subprograms = before.state.subprograms;
+        self.state.line = before.state.line;
+        self.file = Arc::clone(&before.file);
+        (self.phase, self.begun, self.reported_line) =
+            (before.phase, before.begun, before.reported_line);
+        self.ended_by_percent = before.ended_by_percent;
+    }
+
     /// A subprogram begins.
     pub(crate) fn enter_subprogram(&mut self) {
         self.parameters.enter_subprogram();
@@ -287,6 +300,12 @@ impl Interpreter {
     ) -> Result<(), Diagnostic> {
         if self.state.ended {
             return Ok(());
+        }
+        if !self.state.subprograms.obeyed
+            && let Some(at) = o_word::find(text, self.config.block_delete)
+            && by_hand::is_call(text, at)
+        {
+            return by_hand::call(self, number, text, out);
         }
         let items_before = out.len();
         let (next_index, at_rest) = (self.state.path.next_index, self.state.path.at_rest);

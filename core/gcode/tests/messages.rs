@@ -348,7 +348,7 @@ fn the_reader_says_where_and_what() {
         ),
         (
             "G0 X1\nO5",
-            "2:1 [o-word] an O-word stands in a line of its own of a program; manual input has none",
+            "2:1 [o-word] an O-word stands in a line of its own of a program; manual input only calls subroutines",
         ),
     ] {
         assert_messages(program, &[expected]);

@@ -5,7 +5,9 @@ mod common;
 use std::path::PathBuf;
 
 use common::{mill, only_blocks, short};
-use tandem_gcode::{CheckReport, Config, Item, ProbeResult, Program, ProgramError, Stream, check};
+use tandem_gcode::{
+    CheckReport, Config, Interpreter, Item, ProbeResult, Program, ProgramError, Stream, check,
+};
 
 fn checked(text: &str, config: &Config) -> (Program, CheckReport) {
     let mut program = Program::spool("t.ngc", text.as_bytes()).unwrap();
@@ -361,6 +363,24 @@ fn m99_begins_the_program_again() {
     );
 }
 
+/// A planner's refusal shows the line that makes the block, also where that line leads elsewhere.
+#[test]
+fn a_block_is_blamed_on_its_own_line() {
+    let far = "(padding)\n".repeat(20_000);
+    let text = format!("F60\nG1 X7 M98 P5\nM30\n{far}O5\nM99");
+    let mut program = Program::spool("t.ngc", text.as_bytes()).unwrap();
+    let mut refuse = |block: &tandem_sdk::Block, _: Option<tandem_sdk::Curve<'_>>| {
+        if block.end[0] == 7.0 && block.length_mm > 0.0 {
+            Err("too far".to_owned())
+        } else {
+            Ok(())
+        }
+    };
+    let report = check(&mut program, &mill(), &mut refuse).unwrap();
+    let found = &report.diagnostics[0];
+    assert_eq!((found.line, found.excerpt.as_str()), (2, "G1 X7 M98 P5"));
+}
+
 #[test]
 fn subprograms_and_subs_are_not_mixed() {
     let cases = [
@@ -402,4 +422,90 @@ fn a_subprogram_that_a_probe_chooses_is_checked_when_it_is_driven() {
         &mill(),
     );
     assert_eq!((report.is_ok(), report.seen_to), (true, Some(2)));
+}
+
+/// A folder of subroutines, and a machine that knows it.
+fn with_files(files: &[(&str, &str)]) -> (tempfile::TempDir, Config) {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in files {
+        std::fs::write(folder.path().join(name), text).unwrap();
+    }
+    let mut config = mill();
+    config.subroutine_path.push(folder.path().to_path_buf());
+    (folder, config)
+}
+
+#[test]
+fn a_line_by_hand_calls_a_subroutine() {
+    let (_folder, config) = with_files(&[
+        (
+            "step.ngc",
+            "o<step> sub\no1 repeat [#1]\nG91 G0 X1\no1 endrepeat\nG90\n#31=[#31 + #1]\no<step> endsub [7]",
+        ),
+        (
+            "touch.ngc",
+            "o<touch> sub\nF60 G38.2 Z-5\n(done)\no<touch> endsub",
+        ),
+        (
+            "after.ngc",
+            "o<after> sub\nF60 G38.2 Z-8\nG0 Z[#5063]\no<after> endsub",
+        ),
+        (
+            "wrong.ngc",
+            "o<wrong> sub\n#31=99\nG0 X1\nG123 X2\no<wrong> endsub",
+        ),
+        ("end.ngc", "o<end> sub\n#1=5\n#<a>=3\nM2\no<end> endsub"),
+        (
+            "ever.ngc",
+            "o<ever> sub\no1 while [1]\no1 endwhile\no<ever> endsub",
+        ),
+    ]);
+    let mut interpreter = Interpreter::new(config);
+    interpreter.set_file("input");
+    let mut take = |number: u32, text: &str| {
+        let mut items = Vec::new();
+        let done = interpreter.line(number, text.as_bytes(), &mut items);
+        interpreter.go_on();
+        let path = only_blocks(&items);
+        let shown: Vec<_> = path
+            .iter()
+            .map(|b| format!("{}:{}", b.line, short(b.end[0])))
+            .collect();
+        done.map(|()| shown.join(" "))
+            .map_err(|error| error.to_string())
+    };
+    let ok = |text: &str| Ok(text.to_owned());
+    assert_eq!(take(1, "#1=40"), ok(""));
+    assert_eq!(take(2, "o<step> call [3]"), ok("2:1 2:2 2:3"));
+    assert_eq!(take(3, "G0 X[#1 + #31 + #<_value>]"), ok("3:50"));
+    assert_eq!(take(4, "o<touch> call"), ok("4:50 4:50"));
+    let later = take(5, "o<after> call").unwrap_err();
+    assert!(
+        later.contains("after.ngc:3:1") && later.contains("depends on the answer"),
+        "{later}"
+    );
+    let wrong = take(6, "o<wrong> call").unwrap_err();
+    assert!(
+        wrong.contains("wrong.ngc:4:1") && wrong.contains("in o<wrong>, called from line 6"),
+        "{wrong}"
+    );
+    assert!(
+        take(7, "o<none> call")
+            .unwrap_err()
+            .starts_with("input:7:1")
+    );
+    assert!(
+        take(8, "o<ever> call")
+            .unwrap_err()
+            .contains("at most 100000 lines")
+    );
+    assert!(
+        take(8, "o1 if [1]")
+            .unwrap_err()
+            .contains("only calls subroutines")
+    );
+    // What went wrong has changed nothing, and M2 in a subroutine leaves it.
+    assert_eq!(take(9, "G0 X#31"), ok("9:3"));
+    assert_eq!(take(10, "o<end> call"), ok("10:3"));
+    assert_eq!(take(11, "G0 X[#1 + EXISTS[#<a>]]"), ok("11:40"));
 }

@@ -1,6 +1,7 @@
 //! The order in which the lines of a program are executed: one after the other, and as its O-words say.
 
-mod o_word;
+pub(crate) mod by_hand;
+pub(crate) mod o_word;
 mod outline;
 mod repeats;
 mod sources;
@@ -82,14 +83,23 @@ pub(crate) struct Execution {
     last_loop: Option<Loop>,
     /// The line that was executed last, in its chunk.
     last: Range<usize>,
+    /// Its text, where it may have led elsewhere.
     text: Vec<u8>,
+    is_kept: bool,
     values: Vec<Value>,
+    /// The number of the line by hand that is all of the program.
+    by_hand: Option<u32>,
 }
 
 impl Execution {
     pub fn new(program: &mut Program, config: &Config, pass: Pass) -> Self {
         let mut interpreter = Interpreter::new(config.clone());
         interpreter.set_file(&program.name);
+        Self::over(interpreter, program, pass)
+    }
+
+    /// Executes `program` with an interpreter that has executed others.
+    fn over(mut interpreter: Interpreter, program: &mut Program, pass: Pass) -> Self {
         interpreter.obey_jumps();
         Self {
             interpreter,
@@ -101,7 +111,9 @@ impl Execution {
             last_loop: None,
             last: 0..0,
             text: Vec::new(),
+            is_kept: false,
             values: Vec::new(),
+            by_hand: None,
         }
     }
 
@@ -112,7 +124,19 @@ impl Execution {
 
     /// The text of the line that was executed last.
     pub fn text(&self) -> &[u8] {
-        self.sources.current().lines.text(&self.last)
+        if self.is_kept {
+            &self.text
+        } else {
+            self.sources.current().lines.text(&self.last)
+        }
+    }
+
+    /// Keeps the text of the line that is executed: what comes may lead elsewhere.
+    fn keep_text(&mut self) {
+        self.text.clear();
+        self.text
+            .extend_from_slice(self.sources.current().lines.text(&self.last));
+        self.is_kept = true;
     }
 
     /// Executes the next line.
@@ -125,6 +149,7 @@ impl Execution {
         program: &mut Program,
         out: &mut Vec<Item>,
     ) -> Result<Step, ProgramError> {
+        self.is_kept = false;
         match self.sources.next(program)? {
             Next::Line(range) => self.last = range,
             Next::Bad(diagnostic) => return Ok(Step::Wrong(self.called(diagnostic))),
@@ -171,7 +196,10 @@ impl Execution {
                     let done = self.interpreter.line(number, lines.text(&self.last), out);
                     return Ok(done.map_or_else(Step::Wrong, |()| Step::Line));
                 }
-                Ok(Title::Name) => return Ok(self.name_of_program(number)),
+                Ok(Title::Name) => {
+                    let text = lines.text(&self.last).to_vec();
+                    return Ok(self.name_of_program(number, &text));
+                }
                 _ => {}
             }
             let which = self.sources.current;
@@ -181,14 +209,13 @@ impl Execution {
         if let Some(wrong) = self.sources.outline().wrong(number) {
             return Ok(Step::Stuck(self.called(wrong.clone())));
         }
-        let mut text = std::mem::take(&mut self.text);
-        text.clear();
-        text.extend_from_slice(self.sources.current().lines.text(&self.last));
+        self.keep_text();
+        let text = std::mem::take(&mut self.text);
         let found = self.sources.outline().find(number);
         let step = if let Some(index) = found {
             self.obey(program, index, &text, out)
         } else if let Ok(Title::Name) = o_word::OWord::read(&text, at) {
-            Ok(self.name_of_program(number))
+            Ok(self.name_of_program(number, &text))
         } else {
             let done = self.interpreter.line(number, &text, out);
             Ok(done.map_or_else(
@@ -201,13 +228,12 @@ impl Execution {
     }
 
     /// A `<name>` alone: before all words it names the program; behind them what the O-word does has been forgotten.
-    fn name_of_program(&mut self, number: u32) -> Step {
+    fn name_of_program(&mut self, number: u32, text: &[u8]) -> Step {
         let begun = self.interpreter.has_begun();
         self.interpreter.begin_o_word(number);
         if !begun {
             return Step::Line;
         }
-        let text = self.text();
         let fault = o_word::without_keyword(Span::new(0, text.len()));
         let diagnostic = Diagnostic::new(self.interpreter.file(), number, text, fault);
         Step::Wrong(self.called(diagnostic))
@@ -222,10 +248,11 @@ impl Execution {
         assumed: bool,
         out: &mut Vec<Item>,
     ) -> Result<Step, ProgramError> {
+        self.keep_text();
         let number = self.sources.current().lines.number;
         let fault = match jump {
             Jump::Call { .. } if assumed && self.pass == Pass::First => {
-                let text = self.text().to_vec();
+                let text = self.text.clone();
                 return Ok(self.open(number, &text));
             }
             Jump::Call {
@@ -644,11 +671,9 @@ impl Execution {
                 }
                 Callee::Program { number, .. } => format!("O{number}"),
             };
-            let _ = write!(
-                diagnostic.message,
-                "; in {name}, called from line {}",
-                frame.call_line
-            );
+            let by_hand = self.by_hand.filter(|_| frame.file == 0);
+            let line = by_hand.unwrap_or(frame.call_line);
+            let _ = write!(diagnostic.message, "; in {name}, called from line {line}");
         }
         if self.frames.len() > MAX_CALLERS_SHOWN {
             let _ = write!(

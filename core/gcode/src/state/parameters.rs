@@ -141,6 +141,13 @@ impl Parameters {
         self.local = caller.local;
     }
 
+    /// All calls are over, wherever they were.
+    pub fn leave_all(&mut self) {
+        while !self.callers.is_empty() {
+            self.leave(None);
+        }
+    }
+
     /// What the calls say of themselves: `#<_value>`, `#<_value_returned>`, `#<_call_level>`.
     fn of_calls(&self, name: &[u8]) -> Option<Value> {
         let value = |number: f64| Value {

@@ -118,7 +118,7 @@ fn code(letter: char, value: f64, span: Span) -> Checked<Code> {
 }
 
 pub(crate) const O_WORDS: &str =
-    "an O-word stands in a line of its own of a program; manual input has none";
+    "an O-word stands in a line of its own of a program; manual input only calls subroutines";
 
 /// `O1234` alone is the number of a program and harmless; with a word after it, it is flow control.
 fn program_number(

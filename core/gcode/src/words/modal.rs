@@ -79,6 +79,11 @@ impl SavedStates {
         self.calls.push(Level::default());
     }
 
+    /// All subroutines are over, and nothing of them is restored.
+    pub fn leave_all(&mut self) {
+        self.calls.clear();
+    }
+
     fn level(&mut self) -> &mut Level {
         self.calls.last_mut().unwrap_or(&mut self.program)
     }
