@@ -69,8 +69,11 @@ impl Preview {
     pub fn extend(&mut self, cursor: &mut Cursor, until_s: f64) {
         let here_mm = cursor.path_mm();
         if self.next < cursor.next_number() {
+            // At a rest the feed before it says nothing of what follows.
+            let rests = cursor.segment().flags.contains(SegmentFlags::ENDS_AT_REST);
+            let before = cursor.segment().feed_mm_per_s;
             (self.next, self.feed_mm_per_s) =
-                (cursor.next_number(), cursor.segment().feed_mm_per_s);
+                (cursor.next_number(), if rests { 0.0 } else { before });
         }
         while self.count > 0 && self.marks[self.first].path_mm <= here_mm {
             self.first = (self.first + 1) % MARKS;
@@ -98,10 +101,8 @@ impl Preview {
     }
 
     fn see(&mut self, segment: &Segment) {
-        if segment.flags.contains(SegmentFlags::DWELL) || segment.duration_s == 0.0 {
-            return;
-        }
-        if segment.feed_mm_per_s < self.feed_mm_per_s {
+        let moves = !segment.flags.contains(SegmentFlags::DWELL) && segment.duration_s > 0.0;
+        if moves && segment.feed_mm_per_s < self.feed_mm_per_s {
             self.mark(Mark {
                 path_mm: segment.path[0],
                 feed_mm_per_s: segment.feed_mm_per_s,
@@ -109,7 +110,12 @@ impl Preview {
                 acceleration_mm_per_s2: 2.0 * segment.path[2],
             });
         }
-        self.feed_mm_per_s = segment.feed_mm_per_s;
+        if segment.flags.contains(SegmentFlags::ENDS_AT_REST) {
+            // A feed behind a rest is met from nothing; and it may be one of rotary axes, in other units.
+            self.feed_mm_per_s = 0.0;
+        } else if moves {
+            self.feed_mm_per_s = segment.feed_mm_per_s;
+        }
     }
 
     fn mark(&mut self, mark: Mark) {
@@ -176,5 +182,50 @@ impl LineEnd {
             });
         }
         self.chosen_mm
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rtrb::RingBuffer;
+    use tandem_sdk::AxisVector;
+
+    /// The marks ahead of a place at rest behind which feeds follow; `true` where the segment ends at rest.
+    fn marks(feeds: &[(f64, bool)]) -> Vec<(f64, f64)> {
+        let (mut input, output) = RingBuffer::new(16);
+        let mut path_mm = 0.0;
+        for (feed_mm_per_s, rests) in feeds {
+            let mut segment = Segment::rest(&AxisVector::ZERO, 1.0);
+            segment.flags = if *rests {
+                SegmentFlags::ENDS_AT_REST
+            } else {
+                SegmentFlags::default()
+            };
+            segment.feed_mm_per_s = *feed_mm_per_s;
+            segment.path = [path_mm, *feed_mm_per_s, 0.0, 0.0, 0.0, 0.0];
+            path_mm += feed_mm_per_s;
+            let start_s = 0.0;
+            input.push(Queued::Segment { start_s, segment }).unwrap();
+        }
+        let mut cursor = Cursor::new(output, &AxisVector::ZERO);
+        let mut preview = Preview::new();
+        preview.extend(&mut cursor, 10.0);
+        preview
+            .marks()
+            .map(|mark| (mark.path_mm, mark.feed_mm_per_s))
+            .collect()
+    }
+
+    /// A rotary axis may follow there, whose feed is in rad/s: a line before it was driven at that many mm/s.
+    #[test]
+    fn a_lower_feed_behind_a_rest_is_nothing_to_slow_down_for() {
+        assert_eq!(marks(&[(5.0, false), (2.0, false)]), [(5.0, 2.0)]);
+        assert_eq!(marks(&[(5.0, true), (2.0, false)]), []);
+        assert_eq!(
+            marks(&[(5.0, true), (2.0, false), (1.0, true), (0.5, false)]),
+            [(7.0, 1.0)]
+        );
+        assert_eq!(marks(&[(2.0, false), (5.0, false)]), []);
     }
 }

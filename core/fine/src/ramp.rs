@@ -9,8 +9,9 @@ use crate::config::{FineConfig, Joints};
 use crate::guard::Guard;
 use crate::law::to_rest;
 
-/// Share of the jerk with which an axis comes to rest; the rest of it is for getting there.
-const SHARE: f64 = 0.95;
+/// Share of the jerk with which an axis comes to rest: a plan that brakes towards the end of its travel may use all of it, and a
+/// ramp with less would go beyond.
+const SHARE: f64 = 1.0;
 
 /// A ramp to rest.
 #[derive(Clone, Copy, Debug)]
@@ -233,6 +234,60 @@ mod tests {
                 (velocity, acceleration) = (ramp.velocity, next);
             }
             prop_assert!(ramp.is_over());
+        }
+
+        /// A plan brakes to rest with all that the axis has, as towards the end of its travel, and is given up on the way.
+        #[test]
+        fn goes_no_farther_than_a_plan_that_brakes_already(
+            speed in 1.0..200.0f64, most in 100.0..5000.0f64, building_s in 0.003..0.1f64, period_s in 1e-4..1e-3f64,
+            phase in 0.0..1.0f64, at in 0.0..1.0f64,
+        ) {
+            let jerk = most / building_s;
+            let ramp_s = building_s.min((speed / jerk).sqrt());
+            let held_s = speed / (jerk * ramp_s) - ramp_s;
+            let pieces = [(-jerk, ramp_s), (0.0, held_s), (jerk, ramp_s)];
+            let plan = |time_s: f64| {
+                let (mut left_s, mut x, mut v, mut a) = (time_s, 0.0, speed, 0.0);
+                for (j, piece_s) in pieces {
+                    let t = f64::min(left_s, piece_s).max(0.0);
+                    x += t * (v + t * (a / 2.0 + t * j / 6.0));
+                    (v, a) = (v + t * (a + t * j / 2.0), a + t * j);
+                    left_s -= piece_s;
+                }
+                x
+            };
+            // Before the plan brakes it goes straight on.
+            let plan = |time_s: f64| if time_s < 0.0 { speed * time_s } else { plan(time_s) };
+            let time_s = 2.0 * ramp_s + held_s;
+            let samples = (time_s / period_s).floor();
+            let sample = |k: f64| plan((k + phase) * period_s);
+            let k = (at * samples).floor();
+            let velocity = (sample(k) - sample(k - 1.0)) / period_s;
+            let before = (sample(k - 1.0) - sample(k - 2.0)) / period_s;
+            let one = |x: f64| AxisVector::from_slice(&[x]);
+            let mut ramp = Ramp {
+                position: one(sample(k)),
+                velocity: one(velocity),
+                acceleration: one((velocity - before) / period_s),
+                most: [most; MAX_AXES],
+                jerk: [jerk; MAX_AXES],
+                period_s,
+                together: None,
+                axes: 1,
+            };
+            let (mut velocity, mut acceleration, mut last) = (ramp.velocity, ramp.acceleration, ramp.position);
+            for _ in 0..100_000 {
+                if ramp.is_over() { break; }
+                last = ramp.next();
+                let next = (ramp.velocity - velocity) * (1.0 / period_s);
+                let change = (next - acceleration)[0] / period_s;
+                prop_assert!(next[0].abs() <= most * (1.0 + 1e-6), "{} of {most}", next[0]);
+                prop_assert!(change.abs() <= jerk * 1.01, "{change} of {jerk}");
+                (velocity, acceleration) = (ramp.velocity, next);
+            }
+            prop_assert!(ramp.is_over());
+            let (end, grain) = (plan(time_s), jerk * period_s.powi(3));
+            prop_assert!(last[0] <= end + grain, "{} grains beyond", (last[0] - end) / grain);
         }
     }
 }

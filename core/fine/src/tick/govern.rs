@@ -34,6 +34,16 @@ const ABOVE: f64 = 0.01;
 /// Share of the path coordinate by which a difference of two of them is rounded.
 const ROUNDED_SHARE: f64 = 2.0 * f64::EPSILON;
 
+/// By which share of the difference the way of the axes is taken to differ more: the rate changes in the period in which it is
+/// looked at.
+const WIDER: f64 = 0.1;
+/// What is longer by more than that is no fit of a polynomial: where a rotary axis hands over to a linear one, the path coordinate
+/// is in other units.
+const MAX_LONGER: f64 = 1.01;
+
+/// Share of the path coordinate that a period is to be long, so that its length is known to a millionth.
+const MIN_SHARE: f64 = 1e6 * f64::EPSILON;
+
 /// Rounds in which the rate of the first period from rest is sought: 1/2 of what is wrong is left by each.
 const REST_ROUNDS: u32 = 8;
 
@@ -54,7 +64,7 @@ impl FineLoop {
         };
         self.cursor
             .scan(most * self.config.period_s, &mut self.points);
-        let ratios = self.ratios_in_force();
+        let mut ratios = self.ratios_in_force();
         self.ask_for_rate((ratios.feed / self.config.max_feed_ratio).min(ratios.rapid));
         let below = ratios.feed < self.config.max_feed_ratio;
         if self.config.order >= 3 {
@@ -64,6 +74,8 @@ impl FineLoop {
             }
             self.cursor
                 .look_out(self.config.period_s, &mut self.outlook);
+        } else if ask == Ask::Run && below {
+            ratios.feed /= self.longer();
         }
         let end_mm = if ask == Ask::Run {
             self.line_end()
@@ -88,6 +100,24 @@ impl FineLoop {
         self.counters.governed_samples += u64::from(sigma < 1.0 && !self.recovering);
         self.stop_at_line_end(end_mm);
         self.covered(delta_s)
+    }
+
+    /// How much longer the way of the linear axes is in a period like this one than that of the path coordinate, which is a
+    /// polynomial of its own; at least 1.
+    fn longer(&mut self) -> f64 {
+        let delta_s = self.governor.sigma() * self.config.period_s;
+        let lanes = (self.config.lane_count(), self.config.linear);
+        let longer = self.cursor.on_course(lanes, |place| {
+            let mut soon = place;
+            soon.go(delta_s);
+            let (from, to) = (place.pace()?, soon.pace()?);
+            let way_mm = to.path_mm - from.path_mm;
+            // Of next to nothing the rounding is a large share.
+            (way_mm > MIN_SHARE * from.path_mm).then(|| from.way_to_mm(&to) / way_mm)
+        });
+        longer
+            .filter(|longer| *longer < MAX_LONGER)
+            .map_or(1.0, |longer| 1.0 + (1.0 + WIDER) * (longer - 1.0))
     }
 
     /// Whether program time passes at its own rate and nothing asks for another: then nothing needs to be foreseen.
