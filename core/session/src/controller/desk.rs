@@ -16,7 +16,7 @@ use tandem_host::{Command, JobOutcome};
 use tandem_machine::Machine;
 use tandem_rings::{MachineState, Status, Switched};
 use tandem_sdk::AxisVector;
-use tandem_state::{Change, JobKind, Outcome};
+use tandem_state::{Change, Outcome};
 
 use super::described;
 use super::history::{HELD, History, alarm_shown};
@@ -144,7 +144,6 @@ pub struct Inner {
     pub history: History,
     /// Parameters of the policy script, as the next job has them.
     pub policy_parameters: BTreeMap<String, f64>,
-    upload: Option<Upload>,
     last_state: Option<ControllerState>,
 }
 
@@ -158,6 +157,7 @@ pub struct Desk {
     pub keeper: Box<dyn Keeper>,
     pub programs: Option<PathBuf>,
     inner: Mutex<Inner>,
+    upload: Mutex<Option<Upload>>,
     path: Mutex<DrawnPath>,
     scope: Mutex<Scope>,
     seen: Mutex<Seen>,
@@ -201,7 +201,6 @@ impl Desk {
             aborting: false,
             history: History::of(&keeper.remembered()),
             policy_parameters: BTreeMap::new(),
-            upload: None,
             last_state: None,
         };
         Ok(Self {
@@ -213,6 +212,7 @@ impl Desk {
             keeper,
             programs,
             inner: Mutex::new(inner),
+            upload: Mutex::default(),
             path: Mutex::new(DrawnPath::new(machine.axes)),
             scope: Mutex::new(Scope::new(machine)),
             seen: Mutex::default(),
@@ -283,13 +283,9 @@ impl Desk {
     /// A client is gone.
     pub fn forget(&self, client: u64) {
         self.scope().forget(client);
-        let mut inner = self.lock();
-        if inner
-            .upload
-            .as_ref()
-            .is_some_and(|upload| upload.is_by(client))
-        {
-            discard(&mut inner.upload);
+        let mut pending = self.pending();
+        if pending.as_ref().is_some_and(|upload| upload.is_by(client)) {
+            discard(&mut pending);
         }
     }
 
@@ -405,12 +401,15 @@ impl Desk {
 
     /// Judges a request by the state of the machine, and does it or orders it.
     pub fn ask(&self, from: From, asked: &Asked) -> Answered {
-        let mut inner = self.lock();
         let name = if asked.request == "jog" && asked.with.contains_key("stop") {
             "jog-stop"
         } else {
             &asked.request
         };
+        if let Some(answer) = self.ask_disk(from, asked, name) {
+            return Some(answer);
+        }
+        let mut inner = self.lock();
         if let Err(why) = judge(self.state_of(&inner), name) {
             return Some(Err(why.to_string()));
         }
@@ -436,6 +435,26 @@ impl Desk {
         order.1
     }
 
+    /// What waits for a disk while a job may be driven: the loop that drives never waits for that.
+    fn ask_disk(&self, from: From, asked: &Asked, name: &str) -> Option<Result<Value, String>> {
+        if !["list", "upload", "acknowledge"].contains(&name) {
+            return None;
+        }
+        let judged = judge(self.state(), name).map_err(str::to_string);
+        let checked =
+            judged.and_then(|()| word_of(name).map_or(Ok(()), |of| of.check(&asked.with)));
+        Some(checked.and_then(|()| match name {
+            "list" => self.list(),
+            "upload" => self.upload(from, asked, &mut self.pending()),
+            _ => self.acknowledge(asked),
+        }))
+    }
+
+    /// The program that is on its way into the folder.
+    fn pending(&self) -> MutexGuard<'_, Option<Upload>> {
+        self.upload.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     fn act(
         &self,
         from: From,
@@ -457,8 +476,6 @@ impl Desk {
             "alarms" => Ok(Acted::Done(
                 json!({ "alarms": inner.history.open_alarms() }),
             )),
-            "acknowledge" => self.acknowledge(asked, inner).map(Acted::Done),
-            "list" => self.list().map(Acted::Done),
             "machine" => Ok(Acted::Done(described::machine(&self.machine))),
             "tables" => {
                 let lasting = lock(&self.lines).standing().lasting();
@@ -484,7 +501,6 @@ impl Desk {
                 name: asked.text("name")?.to_string(),
                 value: asked.number("value")?,
             })),
-            "upload" => self.upload(from, asked, &mut inner.upload).map(Acted::Done),
             "hold" => give(Command::Hold),
             "resume" => give(Command::Resume),
             "emergency-stop" => give(Command::EmergencyStop),
@@ -595,35 +611,6 @@ impl Desk {
         self.tell_state();
     }
 
-    /// What is driven from now on, for the history. The loop that drives.
-    pub fn begin_history(&self, mode: Mode, name: &str) {
-        let kind = match mode {
-            Mode::Program => JobKind::Program,
-            Mode::Homing => JobKind::Homing,
-            Mode::Mdi => JobKind::Mdi,
-            Mode::Jog => JobKind::Jog,
-            Mode::Idle | Mode::Enabling => return,
-        };
-        let mut inner = self.lock();
-        let loaded = inner.loaded.as_ref().filter(|_| mode == Mode::Program);
-        let hash = loaded.map_or(String::new(), |program| program.hash.clone());
-        let job = inner.history.begin(kind, name, &hash, self.now_unix_ms());
-        drop(inner);
-        self.keeper.record(Change::JobBegan(Box::new(job)));
-    }
-
-    /// Number and hash of the program or the lines that are driven, for the journal.
-    pub fn journal(&self) -> Option<(u64, String)> {
-        let inner = self.lock();
-        let number = inner.history.open()?;
-        let hash = inner.loaded.as_ref().map(|program| program.hash.clone());
-        match inner.mode {
-            Mode::Program => Some((number, hash.unwrap_or_default())),
-            Mode::Mdi => Some((number, String::new())),
-            _ => None,
-        }
-    }
-
     /// A job is over. The loop that drives.
     pub fn finish(&self, mode: Mode, name: &str, outcome: &JobOutcome, unknown_axes: u32) {
         let whole = outcome.fault.is_none() && !outcome.aborted;
@@ -696,31 +683,6 @@ impl Desk {
         );
         self.keeper.record(Change::Raised(Box::new(alarm)));
         self.hub.begin_fault(words);
-    }
-
-    /// An alarm that stops nothing. Host.
-    pub fn raise(&self, code: &str, words: &str) {
-        let now_unix_ms = self.now_unix_ms();
-        let alarm = self.lock().history.raise(code, words, now_unix_ms);
-        self.send(
-            None,
-            &json!({ "event": "alarm", "raised": alarm_shown(&alarm) }),
-        );
-        self.keeper.record(Change::Raised(Box::new(alarm)));
-    }
-
-    /// Somebody has seen alarms; it is on disk when this returns.
-    fn acknowledge(&self, asked: &Asked, inner: &mut Inner) -> Result<Value, String> {
-        let numbers = inner.history.open_alarms_of(asked.whole_if_any("alarm"))?;
-        let at_unix_ms = self.now_unix_ms();
-        let changes = numbers.iter().map(|id| Change::Acknowledged {
-            id: *id,
-            at_unix_ms,
-        });
-        self.keeper.commit(changes.collect())?;
-        inner.history.acknowledge(&numbers, at_unix_ms);
-        self.send(None, &json!({ "event": "alarm", "acknowledged": numbers }));
-        Ok(json!({ "acknowledged": numbers }))
     }
 
     /// A fault has come while nothing was driven, or the drives could not be enabled. The loop that drives.

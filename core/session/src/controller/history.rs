@@ -4,9 +4,11 @@ use std::collections::VecDeque;
 
 use serde_json::{Value, json};
 use tandem_host::JobOutcome;
-use tandem_state::{Alarm, Driven, Job, JobEnd, JobKind, Outcome};
+use tandem_state::{Alarm, Change, Driven, Job, JobEnd, JobKind, Outcome};
 
+use super::desk::{Desk, Mode};
 use super::keeper::Remembered;
+use super::request::Asked;
 
 /// Jobs and alarms that are held ready for clients; a state file keeps more.
 pub const HELD: usize = 100;
@@ -136,6 +138,63 @@ impl History {
             "alarms": self.alarms.iter().rev().take(count).map(alarm_shown).collect::<Vec<_>>(),
             "driven_before": driven,
         })
+    }
+}
+
+impl Desk {
+    /// What is driven from now on, for the history. The loop that drives.
+    pub fn begin_history(&self, mode: Mode, name: &str) {
+        let kind = match mode {
+            Mode::Program => JobKind::Program,
+            Mode::Homing => JobKind::Homing,
+            Mode::Mdi => JobKind::Mdi,
+            Mode::Jog => JobKind::Jog,
+            Mode::Idle | Mode::Enabling => return,
+        };
+        let mut inner = self.lock();
+        let loaded = inner.loaded.as_ref().filter(|_| mode == Mode::Program);
+        let hash = loaded.map_or(String::new(), |program| program.hash.clone());
+        let job = inner.history.begin(kind, name, &hash, self.now_unix_ms());
+        drop(inner);
+        self.keeper.record(Change::JobBegan(Box::new(job)));
+    }
+
+    /// Number and hash of the program or the lines that are driven, for the journal.
+    pub fn journal(&self) -> Option<(u64, String)> {
+        let inner = self.lock();
+        let number = inner.history.open()?;
+        let hash = inner.loaded.as_ref().map(|program| program.hash.clone());
+        match inner.mode {
+            Mode::Program => Some((number, hash.unwrap_or_default())),
+            Mode::Mdi => Some((number, String::new())),
+            _ => None,
+        }
+    }
+
+    /// An alarm that stops nothing. Host.
+    pub fn raise(&self, code: &str, words: &str) {
+        let now_unix_ms = self.now_unix_ms();
+        let alarm = self.lock().history.raise(code, words, now_unix_ms);
+        self.send(
+            None,
+            &json!({ "event": "alarm", "raised": alarm_shown(&alarm) }),
+        );
+        self.keeper.record(Change::Raised(Box::new(alarm)));
+    }
+
+    /// Somebody has seen alarms; it is on disk when this returns.
+    pub fn acknowledge(&self, asked: &Asked) -> Result<Value, String> {
+        let which = asked.whole_if_any("alarm");
+        let numbers = self.lock().history.open_alarms_of(which)?;
+        let at_unix_ms = self.now_unix_ms();
+        let changes = numbers.iter().map(|id| Change::Acknowledged {
+            id: *id,
+            at_unix_ms,
+        });
+        self.keeper.commit(changes.collect())?;
+        self.lock().history.acknowledge(&numbers, at_unix_ms);
+        self.send(None, &json!({ "event": "alarm", "acknowledged": numbers }));
+        Ok(json!({ "acknowledged": numbers }))
     }
 }
 
