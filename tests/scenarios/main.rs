@@ -46,6 +46,7 @@ mod random_curves;
 mod record;
 mod replay;
 mod report;
+mod resident;
 mod script;
 mod senders;
 mod signals;

@@ -2,6 +2,7 @@
 
 mod every_state;
 mod page;
+mod scale;
 mod seeing;
 mod support;
 mod truth;
