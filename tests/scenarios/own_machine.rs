@@ -53,7 +53,7 @@ fn program(random: &mut Random, axes: &[Drawn]) -> String {
     writeln!(program, "F{:.1}", feed * random.between(0.2, 1.0)).unwrap();
     let mut at: Vec<f64> = axes
         .iter()
-        .map(|axis| (axis.low + axis.high) / 2.0)
+        .map(|axis| f64::midpoint(axis.low, axis.high))
         .collect();
     for line in 0..random.below(30) + 3 {
         let rapid = line == 0 || random.below(6) == 0;

@@ -1,5 +1,7 @@
 //! Stops, dwells, outputs and inputs: what a program does beside moving.
 
+use std::fmt::Write;
+
 use crate::harness::Scenario;
 
 /// A plate of pockets: loops, calls of both kinds, modal words that change nothing, and a cycle.
@@ -13,10 +15,17 @@ fn calls_loops_and_modal_words_take_no_time() {
     let mut plain = String::from("G21 G90 G17 G64\nF2400\n");
     for n in 0..6 {
         let (x, y) = (n * 8, n * 4);
-        plain += &format!("G1 X{x} Y{y}\nX{}\nG3 X{} Y{} J4\n", x + 4, x + 8, y + 4);
+        writeln!(
+            plain,
+            "G1 X{x} Y{y}\nX{}\nG3 X{} Y{} J4",
+            x + 4,
+            x + 8,
+            y + 4
+        )
+        .unwrap();
     }
     for n in 0..5 {
-        plain += &format!("G1 X{} Y24.5\nX{} Y24\n", 51 + 6 * n, 54 + 6 * n);
+        writeln!(plain, "G1 X{} Y24.5\nX{} Y24", 51 + 6 * n, 54 + 6 * n).unwrap();
     }
     plain += "G61\nG0 Z1\nG0 X60 Y30\nG1 Z-3\nG0 Z1\nG0 X70\nG1 Z-3\nG0 Z1\nM30\n";
     for planner in ["look-ahead", "smooth"] {

@@ -119,7 +119,7 @@ fn only<'a>(headers: &'a HeaderMap, name: &HeaderName) -> Option<&'a str> {
 
 /// Text from the hexadecimal digits of its bytes: in this form any token fits into a header.
 fn text_of(digits: &str) -> Option<String> {
-    if digits.len() % 2 != 0 || !digits.is_ascii() {
+    if !digits.len().is_multiple_of(2) || !digits.is_ascii() {
         return None;
     }
     let byte = |at: usize| u8::from_str_radix(&digits[at..at + 2], 16).ok();
@@ -138,12 +138,9 @@ mod tests {
     }
 
     fn headers(all: &[(HeaderName, &str)]) -> HeaderMap {
-        let pairs = all
-            .iter()
-            .map(|(name, value)| (name.clone(), value.parse().unwrap()));
-        let mut headers = HeaderMap::new();
-        pairs.for_each(|(name, value)| drop(headers.append(name, value)));
-        headers
+        all.iter()
+            .map(|(name, value)| (name.clone(), value.parse().unwrap()))
+            .collect()
     }
 
     #[test]

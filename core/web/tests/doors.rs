@@ -1,5 +1,6 @@
 //! Who gets through the server to the controller, over real sockets. The controller here is a listener that counts who comes.
 
+use std::fmt::Write as _;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::os::unix::net::{UnixListener, UnixStream};
@@ -106,9 +107,16 @@ fn start(address: &str, controller: &Path) -> Result<Server, String> {
     })
 }
 
+/// The hexadecimal digits of the token's bytes.
+fn digits(token: &str) -> String {
+    token.bytes().fold(String::new(), |mut digits, byte| {
+        let _ = write!(digits, "{byte:02x}");
+        digits
+    })
+}
+
 fn offered(token: &str) -> String {
-    let digits: String = token.bytes().map(|byte| format!("{byte:02x}")).collect();
-    format!("tandem.2, token.{digits}")
+    format!("tandem.2, token.{}", digits(token))
 }
 
 #[test]
@@ -165,10 +173,8 @@ fn strangers_are_refused_and_the_controller_never_hears_of_them() {
 fn the_token_is_asked_by_a_page_that_was_refused() {
     let house = House::open();
     let bearer = |token: &str| {
-        let digits: String = token.bytes().map(|byte| format!("{byte:02x}")).collect();
-        house
-            .get("/token", &format!("Authorization: Bearer {digits}\r\n"))
-            .0
+        let header = format!("Authorization: Bearer {}\r\n", digits(token));
+        house.get("/token", &header).0
     };
     assert_eq!(
         [bearer(TOKEN), bearer("another"), bearer("")],

@@ -100,7 +100,7 @@ impl Rig {
 
     /// Moves all joints back and forth by a little in each period.
     fn go(&mut self) {
-        let step = if self.setpoint.tick / 1000 % 2 == 0 {
+        let step = if (self.setpoint.tick / 1000).is_multiple_of(2) {
             0.05
         } else {
             -0.05
@@ -151,7 +151,9 @@ fn beside_a_bare_frame() {
         }
         times[n % 2].push(begun.elapsed());
     }
-    times.iter_mut().for_each(|times| times.sort_unstable());
+    for times in &mut times {
+        times.sort_unstable();
+    }
     for share in [0.5, 0.99] {
         let [exchange_us, frame_us] = times
             .each_ref()

@@ -152,7 +152,11 @@ fn a_thousand_attaches_take_no_more_memory_than_ten() {
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let mut kept = None;
     let mut attach = |n: usize| {
-        let (mut one, context) = driver(if n % 2 == 0 { "free-run" } else { "dc" });
+        let (mut one, context) = driver(if n.is_multiple_of(2) {
+            "free-run"
+        } else {
+            "dc"
+        });
         one.open(&context).unwrap();
         if n % 5 == 4 {
             one.with_emulator(|wire| wire.inject(What::Cut { behind: None }, None).unwrap());

@@ -29,6 +29,7 @@ pub struct Place {
 pub struct Connect {
     /// Be a client of a controller: at this socket, or where none is named at that of the only controller that runs here
     #[arg(long, value_name = "SOCKET")]
+    #[allow(clippy::option_option)] // how clap tells an option with no value from none
     connect: Option<Option<PathBuf>>,
 }
 

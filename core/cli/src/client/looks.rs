@@ -12,7 +12,7 @@ use super::work::{in_order, tell_trouble};
 use crate::{FAULT, args};
 
 /// How long is waited at once for what comes next.
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_mins(1);
 
 /// Prints the machine as one line, once or as it changes.
 pub fn status(options: &args::Status) -> Result<u8, Box<dyn Error>> {

@@ -161,19 +161,18 @@ impl Draft {
             }
         }
         writeln!(out, "\n[planner]")?;
-        match self.planner() {
-            "smooth" => writeln!(
+        if self.planner() == "smooth" {
+            writeln!(
                 out,
                 "plugin = \"smooth\"                # keeps velocity, acceleration and jerk of each axis"
-            )?,
-            _ => {
-                writeln!(
-                    out,
-                    "# Keeps velocity and acceleration. With a max_jerk for each axis \"smooth\" keeps that too, and is gentler on"
-                )?;
-                writeln!(out, "# the machine.")?;
-                writeln!(out, "plugin = \"block-overlap\"")?;
-            }
+            )?;
+        } else {
+            writeln!(
+                out,
+                "# Keeps velocity and acceleration. With a max_jerk for each axis \"smooth\" keeps that too, and is gentler on"
+            )?;
+            writeln!(out, "# the machine.")?;
+            writeln!(out, "plugin = \"block-overlap\"")?;
         }
         writeln!(
             out,

@@ -310,8 +310,7 @@ impl<'r> Resident<'r> {
     /// The parameters of the policy script, as the next job has them; none without a script.
     pub fn policy_parameters(&self) -> BTreeMap<String, f64> {
         let policy = self.machine.policy.as_ref();
-        let stated = policy.map(|policy| policy.numbers());
-        stated.into_iter().flatten().collect()
+        policy.map_or_else(BTreeMap::new, |policy| policy.numbers().collect())
     }
 
     /// The next job has `value` for the parameter `name` of the policy script. Allocates.

@@ -96,7 +96,7 @@ fn alone(machine: &Machine, text: &str) -> Vec<Sample> {
 fn driven(resident: &mut Resident<'_>, text: &str, kept: &mut Kept) -> JobOutcome {
     let memory = memory(resident.machine());
     let job = resident
-        .program(program(text), Switches::default(), &memory)
+        .program(program(text), Switches::default(), &memory, &mut |_, _| ())
         .unwrap();
     resident.drive(job, kept).unwrap()
 }

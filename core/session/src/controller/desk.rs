@@ -1,6 +1,7 @@
 //! Where all requests come together: what is done at once is done here, the rest is ordered of the loop that drives.
 
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 use std::io::Write as _;
 use std::os::unix::net::UnixStream;
 use std::path::PathBuf;
@@ -113,8 +114,10 @@ pub struct Loaded {
 impl Loaded {
     /// A program, and its hash.
     pub fn new(name: String, text: Arc<[u8]>) -> Self {
-        let digest = Sha256::digest(&text);
-        let hash = digest.iter().map(|byte| format!("{byte:02x}")).collect();
+        let mut hash = String::new();
+        for byte in Sha256::digest(&text) {
+            let _ = write!(hash, "{byte:02x}");
+        }
         Self { name, text, hash }
     }
 }

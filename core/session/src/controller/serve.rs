@@ -286,7 +286,7 @@ impl<'r> Controller<'r> {
                 let job = self.resident.homing(HOMING, axis);
                 self.drive_or_tell(job, Some(from), Mode::Homing, "homing", tell)?;
             }
-            Order::Enable { from, resets } => self.enable(from, resets, tell)?,
+            Order::Enable { from, resets } => self.enable(from, resets, tell),
             Order::Disable { from } => {
                 while !self.resident.disable() {
                     self.idle(tell)?;
@@ -491,7 +491,7 @@ impl<'r> Controller<'r> {
         self.desk.finish(mode, name, outcome, unknown);
     }
 
-    fn enable(&mut self, from: From, resets: bool, tell: Tell<'_>) -> Result<(), HostError> {
+    fn enable(&mut self, from: From, resets: bool, tell: Tell<'_>) {
         let mut inner = self.desk.lock();
         inner.fault = None;
         drop(inner);
@@ -510,7 +510,7 @@ impl<'r> Controller<'r> {
                 // The machine stays where it was; who can, resets once more.
                 self.desk.fault(&why.to_string());
                 self.desk.answer(from, Err(why.to_string()));
-                return Ok(());
+                return;
             }
         };
         self.finish(Mode::Enabling, "enabling", &outcome);
@@ -520,7 +520,6 @@ impl<'r> Controller<'r> {
             None => Ok(json!({ "enabled": true })),
         };
         self.desk.answer(from, answer);
-        Ok(())
     }
 
     /// Whether all drives are simulated.

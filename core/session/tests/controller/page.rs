@@ -11,7 +11,7 @@ fn docs(name: &str) -> PathBuf {
         .join(name)
 }
 
-/// Compares, or writes where UPDATE_DOCS asks for it.
+/// Compares, or writes where `UPDATE_DOCS` asks for it.
 fn compare(path: &Path, found: &str, expected: &str) {
     if std::env::var_os("UPDATE_DOCS").is_some() {
         std::fs::write(path, expected).unwrap();

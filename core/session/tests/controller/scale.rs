@@ -64,7 +64,7 @@ fn drive(name: &str, script: Vec<ScriptLine>) -> (std::collections::BTreeMap<Str
             *counts.entry(word.to_string()).or_insert(0) += 1;
         })
         .unwrap();
-    let grown = resident_bytes() as i64 - at_first.unwrap() as i64;
+    let grown = resident_bytes().cast_signed() - at_first.unwrap().cast_signed();
     (counts, grown)
 }
 

@@ -49,8 +49,8 @@ fn the_path_is_seen_before_it_is_driven_and_where_the_machine_was_behind_it() {
     for pair in arc.windows(2) {
         assert!((radius(pair[0][0], pair[0][1]) - 10.0).abs() < 1e-3);
         let middle = radius(
-            (pair[0][0] + pair[1][0]) / 2.0,
-            (pair[0][1] + pair[1][1]) / 2.0,
+            f64::midpoint(pair[0][0], pair[1][0]),
+            f64::midpoint(pair[0][1], pair[1][1]),
         );
         assert!(10.0 - middle < 0.006, "{middle}");
     }

@@ -153,7 +153,9 @@ pub struct Kept(pub Arc<Mutex<Vec<Lasting>>>, pub Arc<Mutex<Vec<Change>>>);
 
 impl Keeper for Kept {
     fn commit(&self, changes: Vec<Change>) -> Result<(), String> {
-        changes.into_iter().for_each(|change| self.record(change));
+        for change in changes {
+            self.record(change);
+        }
         Ok(())
     }
 
