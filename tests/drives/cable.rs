@@ -49,6 +49,11 @@ fn write_machine(folder: &Path) {
         let input = input.1.as_table_mut().unwrap();
         input.insert("max_age_ms".to_string(), 300.0.into());
     }
+    // At a rapid feed the distance is as large as this computer is late.
+    for axis in machine["axes"].as_table_mut().unwrap().iter_mut() {
+        let axis = axis.1.as_table_mut().unwrap();
+        axis.insert("max_following_error_mm".to_string(), 50.0.into());
+    }
     let loops = machine["loops"].as_table_mut().unwrap();
     loops.insert("max_missed_periods".to_string(), 250.into());
     loops.insert("max_missed_share".to_string(), 1.0.into());

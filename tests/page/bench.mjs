@@ -28,11 +28,11 @@ export async function until(words, look, ms = 20000) {
   }
 }
 
-// tandem serve with its page.
+// tandem serve with its page, on a computer that may be late: what a browser leaves of it is not judged here.
 export async function serve(machine, more = []) {
   const folder = mkdtempSync(join(tmpdir(), "tandem-page-"));
   const socket = join(folder, "socket");
-  const child = spawn(TANDEM, ["serve", "--machine", machine, "--no-state", "--listen", socket, "--http", "127.0.0.1:0", ...more], { stdio: ["ignore", "ignore", "pipe"] });
+  const child = spawn(TANDEM, ["serve", "--machine", machine, "--no-state", "--listen", socket, "--http", "127.0.0.1:0", "--set", "loops.max_missed_periods=1000", "--set", "loops.max_missed_share=1", ...more], { stdio: ["ignore", "ignore", "pipe"] });
   let said = "";
   const link = await new Promise((found, refuse) => {
     child.stderr.on("data", (data) => { said += data; const match = said.match(/http:\/\/\S+/); if (match) found(match[0]); });
