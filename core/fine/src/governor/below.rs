@@ -15,8 +15,7 @@
 //!
 //! The trial counts on less than the limits leave, so it may find that lowering σ does not suffice where a constant σ
 //! does, and would lower it to rest. A constant σ is admissible wherever the plan is: below half of the least rate that
-//! all places allow σ rises, whatever the trial finds, and program time gets on. For the same reason it ends where σ is clearly below
-//! the rate at which a plan that keeps its own feed keeps the one asked for: that is known without a look where all axes are linear.
+//! all places allow σ rises, whatever the trial finds, and program time gets on.
 
 use super::Governor;
 use super::smooth::{Aim, Interval};
@@ -51,9 +50,6 @@ const LOWEST: f64 = 0.5;
 /// Share of the limits of jerk and acceleration that is counted on there: between the places more may be used. Of 17 cases in
 /// which a feed was exceeded 0.9 leaves four, 0.8 one, by 0.001 %.
 const LEFT: f64 = 0.8;
-/// Share of the rate at which a plan that keeps its own feed keeps the one asked for, from which on nothing ahead is looked at, for a
-/// constant rate is admissible: the axes may be faster than the path coordinate.
-const CERTAIN: f64 = 0.9;
 /// Tries in which σ̈ is sought for these places.
 const TRIES: u32 = 6;
 
@@ -84,8 +80,6 @@ struct AheadOf<'a> {
     /// From the last one seen to the next, s.
     step_s: f64,
     ratio: f64,
-    /// A rate at which no place ahead is too fast, whatever the plan does there.
-    certain: f64,
 }
 
 impl AheadOf<'_> {
@@ -215,7 +209,6 @@ impl Governor {
             place: here.place,
             step_s,
             ratio: aim.ratio,
-            certain: CERTAIN * aim.ratio / aim.planned_ratio,
         };
         ahead.place.go(h * sigma);
         let mut change = most;
@@ -245,7 +238,7 @@ impl Governor {
         let (mut time_s, mut most, mut was_below) = (0.0, f64::NEG_INFINITY, false);
         let mut before = (f64::NEG_INFINITY, f64::NEG_INFINITY);
         for number in 0.. {
-            if sigma <= 0.0 || (rate <= 0.0 && sigma <= ahead.certain) {
+            if sigma <= 0.0 {
                 break;
             }
             let Some(place) = ahead.get(number) else {
@@ -355,7 +348,7 @@ mod tests {
                 .fold(0.0, |most: f64, pace| most.max(pace.speed));
             let sigma = 0.499 * part * (ratio * from / fastest).min(1.0);
             let here = Way { sigma, rate_per_s: -falling / period_s, place: course.begin(0.0), recent: Recent::default() };
-            let aim = Aim { sigma: 1.0, speed_mm_per_s: ratio * from, ratio, planned_ratio: 1e9, path: [from, 0.0, 0.0] };
+            let aim = Aim { sigma: 1.0, speed_mm_per_s: ratio * from, ratio, path: [from, 0.0, 0.0] };
             let limits = limits(acceleration, slower, jerk);
             let mut governor = Governor::new(&limits, 2, period_s);
             let most = 0.01 / (period_s * period_s);

@@ -32,8 +32,6 @@ pub struct Aim {
     pub speed_mm_per_s: f64,
     /// Share of the programmed feeds ahead that is not to be exceeded there; infinite where the plan keeps what is asked.
     pub ratio: f64,
-    /// The highest feed ratio that the plan is made for, and its axes keep; infinite where they may go beyond.
-    pub planned_ratio: f64,
     /// Derivatives of the plan's path coordinate here by program time.
     pub path: [f64; 3],
 }

@@ -238,19 +238,11 @@ impl FineLoop {
             };
             ratio * ahead.feed_mm_per_s.min(here)
         };
-        // In a corner of a block that turns a rotary axis too, the linear ones may be faster than the path coordinate by any share.
-        let all = (1_u64 << self.config.axis_count()) - 1;
-        let planned_ratio = if u64::from(self.config.linear) & all == all {
-            self.config.max_feed_ratio
-        } else {
-            f64::INFINITY
-        };
         let aim = match ask {
             Ask::Run => Aim {
                 sigma: run,
                 speed_mm_per_s: feed.min(way_speed_mm_per_s),
                 ratio,
-                planned_ratio,
                 path,
             },
             // Where the plan stands still, its path says nothing.
@@ -258,7 +250,6 @@ impl FineLoop {
                 sigma: if path[0] > 0.0 { run } else { 0.0 },
                 speed_mm_per_s: 0.0,
                 ratio,
-                planned_ratio,
                 path,
             },
         };
