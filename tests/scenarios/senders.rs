@@ -211,16 +211,15 @@ fn assert_done(output: &Output) {
     );
 }
 
-#[test]
-fn grbl_streamer_drives_the_machine() {
-    let Some(folder) = senders("py/grbl_streamer") else {
+/// Has the sender that is installed as `sender` stream the program, as `script` in the language of `command` tells it.
+fn script_drives(sender: &str, command: &str, script: &str) {
+    let Some(folder) = senders(sender) else {
         return;
     };
     let serving = Serving::begin();
-    let script = root().join("tests/senders/grbl_streamer.py");
     let output = drive(
-        Command::new("python3")
-            .arg(script)
+        Command::new(command)
+            .arg(root().join("tests/senders").join(script))
             .arg(&folder)
             .arg(serving.terminal())
             .arg(serving.program()),
@@ -230,21 +229,13 @@ fn grbl_streamer_drives_the_machine() {
 }
 
 #[test]
+fn grbl_streamer_drives_the_machine() {
+    script_drives("py/grbl_streamer", "python3", "grbl_streamer.py");
+}
+
+#[test]
 fn cncjs_drives_the_machine() {
-    let Some(folder) = senders("node_modules/cncjs") else {
-        return;
-    };
-    let serving = Serving::begin();
-    let script = root().join("tests/senders/cncjs.js");
-    let output = drive(
-        Command::new("node")
-            .arg(script)
-            .arg(&folder)
-            .arg(serving.terminal())
-            .arg(serving.program()),
-    );
-    assert_done(&output);
-    serving.judge();
+    script_drives("node_modules/cncjs", "node", "cncjs.js");
 }
 
 #[test]

@@ -307,7 +307,11 @@ impl Desk {
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
             .push((to, format!("{line}\n")));
-        // Where it rings already, it rings.
+        self.ring();
+    }
+
+    /// Wakes the thread that serves the clients; where it rings already, it rings.
+    fn ring(&self) {
         let _ = (&self.bell.1).write(&[1]);
     }
 
@@ -318,8 +322,7 @@ impl Desk {
             let mut waiting = self.frames.lock().unwrap_or_else(PoisonError::into_inner);
             waiting.extend(frames.into_iter().map(|frame| (frame.client, frame.text)));
             drop(waiting);
-            // Where it rings already, it rings.
-            let _ = (&self.bell.1).write(&[1]);
+            self.ring();
         }
         for (client, event) in done {
             self.send(Some(client), &event);
@@ -413,10 +416,7 @@ impl Desk {
             return Some(answer);
         }
         let mut inner = self.lock();
-        if let Err(why) = judge(self.state_of(&inner), name) {
-            return Some(Err(why.to_string()));
-        }
-        if let Some(Err(why)) = word_of(name).map(|word| word.check(&asked.with)) {
+        if let Err(why) = fits(self.state_of(&inner), asked, name) {
             return Some(Err(why));
         }
         let joins = matches!(
@@ -443,10 +443,7 @@ impl Desk {
         if !["list", "upload", "acknowledge"].contains(&name) {
             return None;
         }
-        let judged = judge(self.state(), name).map_err(str::to_string);
-        let checked =
-            judged.and_then(|()| word_of(name).map_or(Ok(()), |of| of.check(&asked.with)));
-        Some(checked.and_then(|()| match name {
+        Some(fits(self.state(), asked, name).and_then(|()| match name {
             "list" => self.list(),
             "upload" => self.upload(from, asked, &mut self.pending()),
             _ => self.acknowledge(asked),
@@ -715,6 +712,12 @@ enum Acted {
     Begins(Order, Value),
     /// The loop that drives answers.
     Ordered(Order),
+}
+
+/// Whether a request fits the state, and has the keys that its word asks for.
+fn fits(state: ControllerState, asked: &Asked, name: &str) -> Result<(), String> {
+    judge(state, name)?;
+    word_of(name).map_or(Ok(()), |word| word.check(&asked.with))
 }
 
 /// Whether a request begins a job or changes what one begins with: one at a time.
