@@ -14,16 +14,13 @@ use tandem_session::jog::{JogMessage, ReachMessage};
 
 use super::connection::{Connection, Trouble, Voice};
 use super::panel::RemotePanel;
-use super::work::{JobEnd, Work, shown_position, tell_trouble};
+use super::work::{JobEnd, Work, exit_status, shown_position};
+use crate::args;
 use crate::jog::RESET;
 use crate::jog::keys::{JogKeys, JogPanel};
 use crate::jog::line::{Line, Wrong, parse};
 use crate::mdi::input::Input;
-use crate::operator::{Keyboard, Panel, Stops, press, tell};
-use crate::{FAULT, REFUSED, args};
-
-/// How often the next line and the controller are looked after.
-const LOOK: Duration = Duration::from_millis(5);
+use crate::operator::{Keyboard, LOOK, Panel, Stops, press, tell};
 
 /// Has the controller jog.
 pub fn jog(at: &args::Connect, options: &args::Jog) -> Result<u8, Box<dyn Error>> {
@@ -59,11 +56,7 @@ pub fn jog(at: &args::Connect, options: &args::Jog) -> Result<u8, Box<dyn Error>
         }
         Ok(()) => jogs.by_lines(),
     };
-    Ok(match done {
-        Err(trouble) => tell_trouble(&trouble),
-        Ok(()) if jogs.fault => FAULT,
-        Ok(()) => u8::from(jogs.refused) * REFUSED,
-    })
+    Ok(exit_status(done, jogs.fault, jogs.refused))
 }
 
 struct Jogs {

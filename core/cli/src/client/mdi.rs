@@ -3,24 +3,21 @@
 use std::error::Error;
 use std::io::{Write, stdout};
 use std::thread;
-use std::time::Duration;
 
 use serde_json::{Value, json};
 use tandem_session::NextLine;
 
 use super::connection::{Connection, Trouble};
-use super::work::{JobEnd, Work, tell_trouble};
+use super::work::{JobEnd, Work, exit_status};
+use crate::args;
 use crate::mdi::conversation::is_farewell;
 use crate::mdi::input::Input;
 use crate::mdi::{RESET, explain};
-use crate::operator::tell;
-use crate::{FAULT, REFUSED, args};
+use crate::operator::{LOOK, tell};
 
 /// Lines of a pipe that are with the controller and not yet driven, at most: far ahead of the machine, and far below what the
 /// controller takes.
 const MAX_AHEAD: usize = 200;
-/// How often the next line and the controller are looked after.
-const LOOK: Duration = Duration::from_millis(5);
 
 /// Has the controller drive lines.
 pub fn mdi(at: &args::Connect, options: &args::Mdi) -> Result<u8, Box<dyn Error>> {
@@ -52,11 +49,7 @@ pub fn mdi(at: &args::Connect, options: &args::Mdi) -> Result<u8, Box<dyn Error>
         .and_then(|()| dialogue.work.connection.release_lease())
         .and_then(|()| dialogue.work.subscribe())
         .and_then(|()| dialogue.talk());
-    Ok(match done {
-        Err(trouble) => tell_trouble(&trouble),
-        Ok(()) if dialogue.fault => FAULT,
-        Ok(()) => u8::from(dialogue.refused) * REFUSED,
-    })
+    Ok(exit_status(done, dialogue.fault, dialogue.refused))
 }
 
 struct Dialogue {

@@ -206,6 +206,15 @@ pub fn tell_trouble(trouble: &Trouble) -> u8 {
     }
 }
 
+/// The exit status of a conversation that came to its end as `done` says; what went wrong is told.
+pub fn exit_status(done: Result<(), Trouble>, has_faulted: bool, was_refused: bool) -> u8 {
+    match done {
+        Err(trouble) => tell_trouble(&trouble),
+        Ok(()) if has_faulted => FAULT,
+        Ok(()) => u8::from(was_refused) * REFUSED,
+    }
+}
+
 /// Coordinates as the controller tells them, in the order in which axes are named.
 pub fn in_order(position: &Value) -> impl Iterator<Item = (&str, f64)> {
     let all = position.as_object().into_iter().flatten();

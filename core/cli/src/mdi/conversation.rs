@@ -4,7 +4,6 @@ use std::io::{Write, stdout};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
-use std::time::Duration;
 
 use tandem_sdk::{Axes, AxisVector};
 use tandem_session::operator::{OperatorHub, Position};
@@ -12,10 +11,7 @@ use tandem_session::{MdiInput, NextLine};
 
 use super::RESET;
 use super::input::Input;
-use crate::operator::{Keyboard, Operator, Stops};
-
-/// How often clients are looked after while the machine is in fault.
-const LOOK: Duration = Duration::from_millis(5);
+use crate::operator::{Keyboard, LOOK, Operator, Stops};
 
 /// What the conversation shares with the command: it outlives faults.
 pub struct Shared {

@@ -26,8 +26,8 @@ pub use panel::{Panel, PanelSwitches};
 pub use signals::{Signals, Stops};
 pub use terminal::{is_on_terminal, keep_terminal, restore_terminal};
 
-/// How often a program stop is looked after while machine time stands still.
-const LOOK: Duration = Duration::from_millis(5);
+/// How often somebody who waits looks at who else may have something to say: at a program stop, at a fault, or for a controller.
+pub const LOOK: Duration = Duration::from_millis(5);
 
 /// Who is there, and in which time.
 #[derive(Clone, Copy, Debug)]

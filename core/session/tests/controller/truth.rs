@@ -13,9 +13,8 @@ use crate::support::{Kept, Says, Told, examples, machine, machine_with};
 /// Two seconds, then #500, then two seconds.
 const WRITES: &str = "G21 G90 F1200\nG1 X40\n#500 = 7\nG10 L2 P2 X5\nG1 Y40\nM2\n";
 
-#[test]
-fn what_a_job_writes_is_kept_when_the_path_reaches_it() {
-    let kept = Kept::default();
+/// A client that loads the program above and starts it.
+fn starts_writes() -> Says {
     let mut says = Says::new();
     says.ask(
         1000,
@@ -23,6 +22,13 @@ fn what_a_job_writes_is_kept_when_the_path_reaches_it() {
         json!({ "text": WRITES, "name": "writes.ngc" }),
     );
     says.ask(10, "start", json!({}));
+    says
+}
+
+#[test]
+fn what_a_job_writes_is_kept_when_the_path_reaches_it() {
+    let kept = Kept::default();
+    let mut says = starts_writes();
     let before = says.ask(1000, "status", json!({}));
     let behind = says.ask(2000, "status", json!({}));
     says.ask(10, "emergency-stop", json!({}));
@@ -51,13 +57,7 @@ fn what_a_job_writes_is_kept_when_the_path_reaches_it() {
 
     // Stopped on the first line it is never written.
     let kept = Kept::default();
-    let mut says = Says::new();
-    says.ask(
-        1000,
-        "load",
-        json!({ "text": WRITES, "name": "writes.ngc" }),
-    );
-    says.ask(10, "start", json!({}));
+    let mut says = starts_writes();
     says.ask(1000, "abort", json!({}));
     says.ask(3000, "status", json!({}));
     Told::by(
