@@ -3,9 +3,10 @@
 // Where two blocks of the feed F overlap for the time T at a turn of the angle a, the corner is rounded by
 // F * T * sin(a / 2) / 4. So T = 4 * error / (F * sin(a / 2)) keeps the error. A block has one time constant, which its
 // two corners share: the sharper turn decides. Where the axes cannot follow within T, the planner slows down by itself.
-import { Block, each, parameter } from "../sdk/assemblyscript/tandem-policy";
-export { tandem_policy_v1 } from "../sdk/assemblyscript/tandem-policy";
+import { Block, each, parameter, withoutGeometry } from "../sdk/assemblyscript/tandem-policy";
+export { tandem_policy_v2 } from "../sdk/assemblyscript/tandem-policy";
 
+withoutGeometry();
 const error = parameter("corner_error_um", 20, 0.5, 1000, "Largest error at a corner, in micrometres");
 const longest = parameter("longest_ms", 50, 1, 1000, "Time constant on a straight path, in ms");
 

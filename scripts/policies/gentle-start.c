@@ -1,5 +1,6 @@
 /* The first cut after a rapid or a tool change begins at a fraction of the feed, and comes up to it over a length. Small
  * tools begin more gently still: a tool of a number up to delicate_tools is one of those. */
+#define TANDEM_WITHOUT_GEOMETRY
 #include "../sdk/c/tandem_policy.h"
 
 enum { START, LENGTH, DELICATE, DELICATE_START };

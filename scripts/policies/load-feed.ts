@@ -2,7 +2,7 @@
 // torque is the estimate of the feed strategy where there is one; without one the motor current of the loaded axis stands
 // in for it.
 import { Parameter, Period, keepState, parameter } from "../sdk/assemblyscript/tandem-policy";
-export { tandem_policy_v1 } from "../sdk/assemblyscript/tandem-policy";
+export { tandem_policy_v2 } from "../sdk/assemblyscript/tandem-policy";
 
 const current: Parameter = parameter("reference_current_a", 4, 0.01, 1000, "Current that counts as full load, in A, where no torque is estimated");
 const lowest: Parameter = parameter("lowest_ratio", 0.3, 0.05, 1, "Feed ratio that is not gone below");

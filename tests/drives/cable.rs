@@ -69,6 +69,8 @@ struct Ran {
     told: String,
     /// What the emulator told, a line for each change of a device.
     bus: String,
+    /// What other commands told that the script ran meanwhile.
+    beside: String,
     /// Rows of the trace, with the names of the columns first.
     trace: Vec<Vec<String>>,
 }
@@ -112,6 +114,7 @@ fn ran(arguments: &str, script: &str) -> Option<Ran> {
         status: output.status.code(),
         told,
         bus: file("bus.txt"),
+        beside: file("beside.txt"),
         trace: file("trace.csv").lines().map(row).collect(),
     })
 }
@@ -162,6 +165,39 @@ fn a_program_runs_over_a_cable() {
             ran.everything()
         );
     }
+}
+
+/// Objects of the drives are read and written by another command while the program runs: the process that drives the bus does it.
+#[test]
+fn objects_are_read_and_written_while_a_program_runs() {
+    let sdo = format!("{} bus sdo", env!("CARGO_BIN_EXE_tandem"));
+    let script = format!(
+        "soon 'device 2 z: Op, OperationEnabled' bus.txt; sleep 1\n\
+         ({sdo} write 1 0x6085 32 9876543 --interface {MASTER_END}; {sdo} read 1 0x6085 --machine machine.toml\n\
+         {sdo} write 0 0x607a 32 5 --interface {MASTER_END}; {sdo} read 9 0x6085 --interface {MASTER_END}\n\
+         {sdo} read 1 0x5fff --interface {MASTER_END}) > beside.txt 2>&1\n\
+         echo \"and it runs: $(kill -0 $tandem && echo yes)\" >> beside.txt; kill -INT $tandem"
+    );
+    let arguments = "run long.ngc --clock wall --set machine.require_homing=false";
+    let Some(ran) = ran(arguments, &script) else {
+        return;
+    };
+    for words in [
+        "6085:00 = 0x96b43f, read back",
+        "6085:00 = 0x0096b43f, 9876543, 9876543 with a sign, 32 bits",
+        "device 0 (x): 607A is the driver's own, which writes it in every period",
+        "there is no device 9: 7 are on the bus, from 0",
+        "device 1 (y): reading 5FFF:00: it refuses",
+        "and it runs: yes",
+    ] {
+        assert!(
+            ran.beside.contains(words),
+            "{words}: {}\n{}",
+            ran.beside,
+            ran.everything()
+        );
+    }
+    assert!(!ran.told.contains("fault"), "{}", ran.everything());
 }
 
 /// The master dies, or falls silent, in mid-motion: the drives stop by their own watchdog, on their own ramp.
@@ -245,5 +281,42 @@ fn the_machine_faults_by_name_when_the_bus_is_gone() {
             sent[sent.len() - 2],
             "{end}: it comes to rest"
         );
+    }
+}
+
+/// The adapter goes and comes back, with another number: a reset says what is missing, and then opens it again.
+#[test]
+fn an_interface_that_went_and_came_back_is_opened_again_by_a_reset() {
+    let script = format!(
+        "ask=\"{tandem} ask --connect s.socket\"\n\
+         until_state() {{ n=0; until $ask status | grep -q '\"state\":\"'$1'\"' || [ $n -gt 400 ]; do sleep 0.05; n=$((n+1)); done; }}\n\
+         until_state ready\n\
+         ip link del {BUS_END}; until_state fault\n\
+         $ask reset > beside.txt 2>&1; until_state fault\n\
+         kill -KILL $emulator\n\
+         ip link add {BUS_END} type veth peer name {MASTER_END}\n\
+         for end in {BUS_END} {MASTER_END}; do echo 1 > /proc/sys/net/ipv6/conf/$end/disable_ipv6; ip link set dev $end up; done\n\
+         $fast {emulator} bus.toml --interface {BUS_END} --for 120 > bus.txt & emulator=$!\n\
+         n=0; until grep -q devices bus.txt || [ $n -gt 100 ]; do sleep 0.1; n=$((n+1)); done\n\
+         ($ask reset; until_state ready; $ask mdi line='G1 X0.5 F600'; $ask status) >> beside.txt 2>&1\n\
+         kill -INT $tandem",
+        tandem = env!("CARGO_BIN_EXE_tandem"),
+        emulator = program_beside("tandem-ethercat-emulator")
+            .unwrap_or_default()
+            .display(),
+    );
+    let arguments =
+        "serve --no-state --enable --listen s.socket --set machine.require_homing=false";
+    let Some(ran) = ran(arguments, &script) else {
+        return;
+    };
+    let told = format!("{}\n{}", ran.beside, ran.everything());
+    let missing = format!("there is no network interface {MASTER_END}");
+    for words in [
+        missing.as_str(),
+        "\"outcome\":\"done\"",
+        "\"old_feedback_periods\"",
+    ] {
+        assert!(ran.beside.contains(words), "{words}: {told}");
     }
 }

@@ -65,7 +65,8 @@ fn table(seed: u64, faults: &str, options: &str) -> String {
     text + faults
 }
 
-fn fault(at: &str, lasts: &str, what: &str) -> String {
+/// A fault of the emulated bus as the machine file has it.
+pub fn fault(at: &str, lasts: &str, what: &str) -> String {
     let lasts = if lasts.is_empty() {
         String::new()
     } else {
@@ -76,7 +77,8 @@ fn fault(at: &str, lasts: &str, what: &str) -> String {
     )
 }
 
-fn machine(text: &str) -> Machine {
+/// The machine of this file.
+pub fn machine(text: &str) -> Machine {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("machine.toml");
     std::fs::write(&path, text).unwrap();
@@ -84,7 +86,7 @@ fn machine(text: &str) -> Machine {
 }
 
 /// How many machines are tried.
-fn seeds() -> u64 {
+pub fn seeds() -> u64 {
     std::env::var("TANDEM_SEEDS")
         .ok()
         .and_then(|count| count.parse().ok())
@@ -92,15 +94,20 @@ fn seeds() -> u64 {
 }
 
 /// What a run came to: its samples, and the words of its fault or of its refusal.
-struct Ran {
-    samples: Samples,
-    fault: Option<String>,
-    refused: bool,
+pub struct Ran {
+    pub samples: Samples,
+    pub fault: Option<String>,
+    pub refused: bool,
 }
 
 fn ran(text: &str) -> Ran {
+    ran_with(text, SHORT, Switches::default())
+}
+
+/// Runs a program on the machine of this file.
+pub fn ran_with(text: &str, of_program: &str, switches: Switches) -> Ran {
     let machine = machine(text);
-    let run = match Run::prepare(machine, &registry(), program(SHORT), Switches::default()) {
+    let run = match Run::prepare(machine, &registry(), program(of_program), switches) {
         Ok(run) => run,
         Err(error) => {
             return Ran {
@@ -126,10 +133,10 @@ fn ran(text: &str) -> Ran {
 }
 
 /// Every setpoint within the limits of its axis, and the last one at rest.
-fn judge(case: &str, text: &str, samples: &Samples) {
+pub fn judge(case: &str, text: &str, samples: &Samples) {
     let machine = machine(text);
     for window in samples.0.windows(3) {
-        for axis in 0..3 {
+        for axis in 0..machine.axes.count() {
             let at = |i: usize| window[i].command[axis];
             let before = (at(1) - at(0)) / machine.fine_period_s;
             let after = (at(2) - at(1)) / machine.fine_period_s;
@@ -152,7 +159,12 @@ fn judge(case: &str, text: &str, samples: &Samples) {
 
 /// The frame of process data, from 1, in which the program's first sample was sent, and the number of its samples.
 fn frames(seed: u64) -> (u64, u64) {
-    let whole = ran(&table(seed, "", ""));
+    frames_of(|faults| ran(&table(seed, faults, "")))
+}
+
+/// The same of what `ran` runs with faults of the bus.
+pub fn frames_of(ran: impl Fn(&str) -> Ran) -> (u64, u64) {
+    let whole = ran("");
     assert_eq!(whole.fault, None);
     // A reply that is lost in frame n is missing in sample n − first.
     for n in (1..4000).step_by(20) {
@@ -161,7 +173,7 @@ fn frames(seed: u64) -> (u64, u64) {
             "cycles = 1",
             "kind = \"lost-reply\"",
         );
-        let ran = ran(&table(seed, &lost, ""));
+        let ran = ran(&lost);
         if let Some(seen) = ran
             .samples
             .0
@@ -359,6 +371,10 @@ fn what_is_wrong_from_the_start_is_refused_in_words() {
         (
             "kind = \"silent-mailbox\", device = 2",
             "device 2 (z): reading 6502:00: its mailbox does not answer",
+        ),
+        (
+            "kind = \"emergencies\", device = 2, messages = 100000, code = 0x6100",
+            "device 2 (z): reading 6502:00: it sends an emergency message in place of each answer",
         ),
         (
             "kind = \"mode-shown\", device = 0, mode = 3",

@@ -7,18 +7,20 @@ mod cable;
 mod counting_allocator;
 mod double;
 mod ethercat;
+mod every_frame;
+#[path = "../../core/host/tests/drives/four_axes.rs"]
+mod four_axes;
 mod keeper;
-mod mapping;
 mod measures;
 mod real;
 mod several;
 mod slow;
 mod tower;
 
-use tandem_gcode::Program;
 use tandem_host::{Registry, RunObserver};
-use tandem_machine::Machine;
 use tandem_rings::Sample;
+
+use four_axes::{machine, program, try_machine};
 
 /// A registry with the driver for tests beside those that are needed.
 fn registry() -> Registry {
@@ -32,31 +34,6 @@ fn registry() -> Registry {
         registry.register(plugin).unwrap();
     }
     registry
-}
-
-/// Four axes, and these tables of drivers.
-fn machine(drivers: &str) -> Machine {
-    try_machine(drivers).unwrap()
-}
-
-fn try_machine(drivers: &str) -> Result<Machine, String> {
-    let mut text = "format = 1\n[planner]\nplugin = \"look-ahead\"\n".to_string();
-    for axis in ["x", "y", "z", "a"] {
-        let keys = if axis == "a" {
-            "kind = \"rotary\"\ntravel_deg = [-360, 360]\nmax_feed_deg_per_min = 7200\nmax_acceleration_deg_per_s2 = 900\n"
-        } else {
-            "travel_mm = [-250, 250]\nmax_feed_mm_per_min = 6000\nmax_acceleration_mm_per_s2 = 800\n"
-        };
-        text.extend(["[axes.", axis, "]\n", keys]);
-    }
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("machine.toml");
-    std::fs::write(&path, text + drivers).unwrap();
-    Machine::read(&path, &[]).map_err(|error| error.to_string())
-}
-
-fn program(text: &str) -> Program {
-    Program::spool("p.ngc", text.as_bytes()).unwrap()
 }
 
 /// A program in which all axes move all the time.

@@ -211,9 +211,9 @@ fn drives_are_enabled_where_they_stand() {
     let outcome = run.drive(Clock::Wall, &[], &mut ()).unwrap();
     assert_eq!(outcome.summary.fault, None);
     let log = log("stands");
-    let most_mm = 100.0 * 0.001;
+    let max_mm = 100.0 * 0.001;
     assert!(
-        log.largest_step <= most_mm * (1.0 + 1e-9),
+        log.largest_step <= max_mm * (1.0 + 1e-9),
         "{} mm in a period",
         log.largest_step
     );

@@ -17,17 +17,16 @@ fn with_spindle(name: &str, spindle: &str) -> String {
 
 const TURNS: &str = "G21 G90 G94 F600\nM3 S1000\nG1 X20\nM2\n";
 
+fn prepared(text: &str) -> Run {
+    let machine = machine(text);
+    Run::prepare(machine, &registry(), program(TURNS), Switches::default()).unwrap()
+}
+
 /// 200 ms an answer, and after six of them none: the exchange with the others waits for neither.
 #[test]
 fn a_slow_device_delays_no_exchange_also_where_it_falls_silent() {
     let text = with_spindle("slow", ", slow_ms = 200, silent_after = 6");
-    let run = Run::prepare(
-        machine(&text),
-        &registry(),
-        program(TURNS),
-        Switches::default(),
-    )
-    .unwrap();
+    let run = prepared(&text);
     let mut samples = Samples::default();
     let summary = run.drive(Clock::Wall, &[], &mut samples).unwrap().summary;
     let (bus, line) = (log("slow-bus"), log("slow-line"));
@@ -78,13 +77,7 @@ fn a_slow_device_delays_no_exchange_also_where_it_falls_silent() {
 fn a_slow_spindle_that_falls_silent_ends_the_run_by_its_name_before_anything_cuts() {
     let text = with_spindle("dumb", ", slow_ms = 200, silent_after = 1")
         + "[spindle]\nat_speed_within_s = 1\n";
-    let run = Run::prepare(
-        machine(&text),
-        &registry(),
-        program(TURNS),
-        Switches::default(),
-    )
-    .unwrap();
+    let run = prepared(&text);
     let mut samples = Samples::default();
     let summary = run.drive(Clock::Wall, &[], &mut samples).unwrap().summary;
     let fault = summary.fault.unwrap();
@@ -108,13 +101,7 @@ fn a_slow_spindle_that_falls_silent_ends_the_run_by_its_name_before_anything_cut
 #[test]
 fn on_the_virtual_clock_a_slow_driver_is_called_in_line() {
     let text = with_spindle("in-line", ", slow_ms = 1");
-    let run = Run::prepare(
-        machine(&text),
-        &registry(),
-        program(TURNS),
-        Switches::default(),
-    )
-    .unwrap();
+    let run = prepared(&text);
     assert_eq!(
         run.drive(Clock::Virtual, &[], &mut ())
             .unwrap()

@@ -124,6 +124,63 @@ fn a_day_at_the_emulated_mill() {
     assert_eq!(jobs.last(), Some(&("program", "done")), "{}", day.text);
 }
 
+/// The cable is pulled in mid-program: a reset says that nothing answers until it is plugged in again, and then finds the drives
+/// where they came to rest by themselves, with what they count.
+#[test]
+fn a_bus_that_was_lost_comes_back_by_a_reset_where_its_drives_stand() {
+    let pulled = "[[drivers.bus.options.emulated.faults]]\nat = { ms = 25000.0 }\nlasts = { ms = 2000.0 }\n\
+                  what = { kind = \"cut\" }\n";
+    let script = r#"
+{"tick":100,"client":1,"say":{"id":1,"request":"lease","how":"take"}}
+{"tick":100,"client":1,"say":{"id":2,"request":"home"}}
+{"tick":16000,"client":1,"say":{"id":3,"request":"mdi","line":"G1 X10 F3000"}}
+{"tick":22000,"client":1,"say":{"id":4,"request":"touch-off","z_mm":7}}
+{"tick":24500,"client":1,"say":{"id":5,"request":"mdi","line":"G1 X60 F1800"}}
+{"tick":28000,"client":1,"say":{"id":6,"request":"status"}}
+{"tick":28100,"client":1,"say":{"id":7,"request":"reset"}}
+{"tick":28200,"client":1,"say":{"id":8,"request":"reset"}}
+{"tick":28300,"client":1,"say":{"id":9,"request":"reset"}}
+{"tick":28400,"client":1,"say":{"id":10,"request":"reset"}}
+{"tick":28500,"client":1,"say":{"id":11,"request":"reset"}}
+{"tick":28600,"client":1,"say":{"id":12,"request":"reset"}}
+{"tick":32000,"client":1,"say":{"id":14,"request":"status"}}
+{"tick":32010,"client":1,"say":{"id":15,"request":"home"}}
+{"tick":60000,"client":1,"say":{"id":16,"request":"mdi","line":"G1 X20 F3000"}}
+{"tick":66000,"client":1,"say":{"id":17,"request":"status"}}
+"#;
+    let day = Day::of(pulled, script);
+    let (lost, back) = (&day.answer(6)["ok"], &day.answer(14)["ok"]);
+    let at = |status: &Value, axis: &str| status["position"][axis].as_f64().unwrap();
+    assert_eq!(lost["state"], "fault", "{}", day.text);
+    assert_eq!(lost["joints"][0]["state"], "lost", "{}", day.text);
+    let refused = day.answer(7)["error"]["why"].as_str().unwrap_or_default();
+    assert!(
+        refused.contains("drivers.bus: driver bus (ethercat): ethercat: ")
+            && refused.contains("is it powered, and the first cable at its input port?"),
+        "{refused}"
+    );
+    let accepted = (8..=12).filter(|id| day.answer(*id)["ok"].is_object());
+    assert_eq!(accepted.count(), 1, "{}", day.text);
+    // They stand where they were when the cable was pulled: the ramp behind that is one that nobody heard. A bus that was given
+    // its power anew would stand at 11.9 mm.
+    assert_eq!(back["state"], "homing-needed", "{}", day.text);
+    let (told, stands) = (at(lost, "x_mm"), at(back, "x_mm"));
+    assert!(
+        15.0 < stands && stands < told && told < 16.0,
+        "{stands} {told}"
+    );
+    assert_eq!(back["offset"]["z_mm"].as_f64(), Some(-7.0));
+    let jobs = [
+        ("home", "done"),
+        ("mdi", "done"),
+        ("mdi", "fault"),
+        ("home", "done"),
+    ];
+    assert_eq!(day.jobs()[..4], jobs, "{}", day.text);
+    assert_eq!(day.jobs().last(), Some(&("mdi", "done")), "{}", day.text);
+    assert_eq!(at(&day.answer(17)["ok"], "x_mm"), 20.0);
+}
+
 /// The force that the drives tell by 6077 is held by the feed, in a specimen whose steps take ever more of it.
 #[test]
 fn the_cutting_torque_is_held_by_what_the_drives_tell() {

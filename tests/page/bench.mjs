@@ -82,9 +82,10 @@ export function browse() {
   return chromium.launch({ executablePath: CHROMIUM, args });
 }
 
-// A page of the controller, once it shows the machine.
-export async function open(browser, link, options = {}) {
+// A page of the controller, once it shows the machine; `before` runs in it before anything else.
+export async function open(browser, link, { before, ...options } = {}) {
   const context = await browser.newContext({ viewport: { width: 1280, height: 800 }, ...options });
+  if (before) await context.addInitScript(before);
   const page = await context.newPage();
   const errors = [];
   page.on("pageerror", (error) => errors.push(error.message));

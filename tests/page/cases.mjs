@@ -1,5 +1,5 @@
 // What the page promises beside the jog.
-import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from "node:fs";
+import { mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { axeSource, browse, check, echo, observer, open, ready, renderersOf, serve, sleep, take, until } from "./bench.mjs";
@@ -66,24 +66,24 @@ export async function program() {
   });
 }
 
-// A click on hold is with the fine loop as soon as anything that the page says.
+// A click on hold is with the fine loop as soon as anything that the page says while it has nothing to draw: moving, drawing and
+// telemetry stand in nobody's way. Of some clicks the fastest counts; the computer that tests is slow for reasons of its own.
 export async function hold() {
   await inside(MACHINE, async ({ controller, browser, watch }) => {
     const page = await open(browser, controller.link);
     await take(page);
-    await watch.ask("status");
+    const still = await echo(page);
     const delays = [];
-    // While the machine moves, as at the click: there is more to draw then.
-    let most = 0;
-    for (let i = 0; i < 5; i++) {
+    for (let i = 0; i < 7; i++) {
       await page.evaluate(() => window.tandem.link.ask("mdi", { line: `G1 X${200 * (window.side = -(window.side || 1))} F3000` }));
       await until("it moves", async () => (await watch.ask("status")).feed_mm_per_min > 100);
-      most = Math.max(most, await echo(page));
       await page.evaluate(() => {
         const ask = window.tandem.link.ask.bind(window.tandem.link);
-        document.getElementById("hold").addEventListener("click", (event) => { window.clicked = event.timeStamp; }, { once: true, capture: true });
+        window.said = [];
+        document.getElementById("hold").addEventListener("click", (event) => { window.clicked = event.timeStamp; window.said = []; }, { once: true, capture: true });
         window.tandem.link.ask = (request, keys) => {
           const answer = ask(request, keys);
+          window.said.push(request);
           if (request === "hold") answer.then((told) => { window.answered = performance.now(); window.tick = told.tick; });
           return answer;
         };
@@ -91,13 +91,14 @@ export async function hold() {
       await page.click("#hold");
       await page.waitForFunction(() => window.answered > window.clicked);
       delays.push(await page.evaluate(() => window.answered - window.clicked));
+      check(await page.evaluate(() => window.said[0] === "hold"), "something is said between the click and hold");
       await until("it is held", async () => (await watch.ask("status")).state === "held");
       await page.evaluate(() => window.tandem.link.ask("abort"));
       await until("it rests", async () => (await watch.ask("status")).state === "ready");
     }
     const best = Math.min(...delays);
-    console.log(`hold: ${delays.map((ms) => ms.toFixed(1)).join(", ")} ms from click to answer; echo at most ${most.toFixed(1)} ms`);
-    check(best <= most + 20, `the fastest of five took ${best} ms`);
+    console.log(`hold: ${delays.map((ms) => ms.toFixed(1)).join(", ")} ms from click to answer; echo at rest ${still.toFixed(1)} ms`);
+    check(best <= still + 20, `the fastest of seven took ${best} ms`);
     clean(page);
   });
 }
@@ -190,21 +191,22 @@ export async function token() {
 // No serious finding of axe-core, in both themes, on a screen and on a tablet; and everything by the keyboard.
 export async function access() {
   await inside(MACHINE, async ({ controller, browser, watch }) => {
-    for (const colorScheme of ["dark", "light"]) {
-      for (const [width, height] of [[1280, 800], [768, 1024]]) {
-        const page = await open(browser, controller.link, { colorScheme, viewport: { width, height } });
-        for (const panel of ["jog", "mdi", "programs", "offsets", "tools", "history"]) {
-          await page.click("#tab-" + panel);
-          await sleep(100);
-          await page.addScriptTag({ path: axeSource() }).catch(async () => page.evaluate(await source()));
-          const found = await page.evaluate(() => window.axe.run({ resultTypes: ["violations"] }));
-          const serious = found.violations.filter((one) => ["serious", "critical"].includes(one.impact));
-          check(serious.length === 0, `${colorScheme} ${width} ${panel}: ` + JSON.stringify(serious.map((one) => [one.id, one.help, one.nodes.slice(0, 4).map((node) => [node.html.slice(0, 160), node.any.map((any) => any.message)])]), null, 1));
-        }
-        const wide = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
-        check(wide <= 0, `${width}: it is ${wide} pixels too wide`);
-        await page.close();
+    const [screen, tablet] = [[1280, 800], [768, 1024]];
+    const all = [["dark", screen], ["light", tablet], ["dark", tablet], ["light", screen]];
+    // Colours are judged in both themes and sizes on both screens; TANDEM_QUIET has the time for each with each.
+    for (const [colorScheme, [width, height]] of process.env.TANDEM_QUIET ? all : all.slice(0, 2)) {
+      const page = await open(browser, controller.link, { colorScheme, viewport: { width, height } });
+      for (const panel of ["jog", "mdi", "programs", "offsets", "tools", "history", "capture", "machine"]) {
+        await page.click("#tab-" + panel);
+        await sleep(100);
+        await page.addScriptTag({ path: axeSource() }).catch(async () => page.evaluate(source()));
+        const found = await page.evaluate(() => window.axe.run({ resultTypes: ["violations"] }));
+        const serious = found.violations.filter((one) => ["serious", "critical"].includes(one.impact));
+        check(serious.length === 0, `${colorScheme} ${width} ${panel}: ` + JSON.stringify(serious.map((one) => [one.id, one.help, one.nodes.slice(0, 4).map((node) => [node.html.slice(0, 160), node.any.map((any) => any.message)])]), null, 1));
       }
+      const wide = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
+      check(wide <= 0, `${width}: it is ${wide} pixels too wide`);
+      await page.close();
     }
     const page = await open(browser, controller.link);
     const press = async (target, key = "Enter") => {
@@ -214,10 +216,10 @@ export async function access() {
       }
       throw new Error(`${target} is not reached by the keyboard`);
     };
-    await page.click("#tab-history");
+    await page.click("#tab-machine");
     await press("#lease");
     await page.waitForFunction(() => window.tandem.hasLease);
-    await press("#tab-history", "ArrowRight");
+    await press("#tab-machine", "ArrowRight");
     await press("#tab-jog", "Tab");
     await press(".pad", "ArrowUp");
     await page.keyboard.down("ArrowRight");
@@ -230,16 +232,16 @@ export async function access() {
   });
 }
 
-async function source() {
-  const { readFileSync } = await import("node:fs");
-  return readFileSync(axeSource(), "utf8");
-}
+const source = () => readFileSync(axeSource(), "utf8");
 
-// A program of 300 000 lines is drawn while the page stays at hand, by the processor alone.
+const LINES = 300000;
+
+// A program of 300 000 lines is drawn while the page stays at hand, by the processor alone: each line is told once and drawn once, and
+// no task is longer than those of the same page that has nothing to draw. On a quiet computer TANDEM_QUIET asks for the times too.
 export async function many() {
   const folder = mkdtempSync(join(tmpdir(), "tandem-many-"));
   const lines = ["G21 G90 F3000"];
-  for (let i = 0; i < 300000; i++) lines.push(`X${(100 * Math.cos(i * 0.05)).toFixed(2)} Y${(100 * Math.sin(i * 0.0513)).toFixed(2)}`);
+  for (let i = 0; i < LINES; i++) lines.push(`X${(100 * Math.cos(i * 0.05)).toFixed(2)} Y${(100 * Math.sin(i * 0.0513)).toFixed(2)}`);
   lines[1] = "G1 " + lines[1];
   writeFileSync(join(folder, "many.ngc"), lines.join("\n") + "\nM2\n");
   try {
@@ -247,24 +249,234 @@ export async function many() {
       const page = await open(browser, controller.link);
       await watch.ask("lease", { how: "take" });
       await page.evaluate(() => {
-        window.longest = 0;
-        new PerformanceObserver((list) => { for (const task of list.getEntries()) window.longest = Math.max(window.longest, task.duration); }).observe({ type: "longtask" });
+        window.tasks = [];
+        new PerformanceObserver((list) => { for (const task of list.getEntries()) window.tasks.push(task.duration); }).observe({ type: "longtask" });
+        const ask = window.tandem.link.ask.bind(window.tandem.link);
+        window.answers = 0;
+        window.tandem.link.ask = (request, keys) => { if (request === "path") window.answers++; return ask(request, keys); };
       });
+      const takeTasks = () => page.evaluate(() => { const all = window.tasks; window.tasks = []; return all; });
+      // The program is checked meanwhile, which keeps the computer as busy as drawing does.
+      await takeTasks();
       await watch.ask("load", { path: "many.ngc" });
+      const quiet = Math.max(0, ...(await takeTasks()));
       const start = Date.now();
-      await page.waitForFunction(() => window.tandem.drawnLines >= 300000, null, { timeout: 60000 });
+      await page.waitForFunction((lines) => window.tandem.drawnPoints >= lines, LINES, { timeout: 120000 });
       const seconds = (Date.now() - start) / 1000;
+      const longest = Math.max(0, ...(await takeTasks()));
       const session = await page.context().newCDPSession(page);
       await session.send("Performance.enable");
       const { metrics } = await session.send("Performance.getMetrics");
       const heap = metrics.find(({ name }) => name === "JSHeapUsedSize").value / 1e6;
-      const longest = await page.evaluate(() => window.longest);
-      console.log(`300 000 lines: drawn in ${seconds.toFixed(1)} s, heap ${heap.toFixed(0)} MB, longest task ${longest.toFixed(0)} ms`);
+      const { answers, painted, points } = await page.evaluate(() => ({ answers: window.answers, painted: window.tandem.paintedPoints, points: window.tandem.drawnPoints }));
+      console.log(`300 000 lines: drawn in ${seconds.toFixed(1)} s, heap ${heap.toFixed(0)} MB, longest task ${longest.toFixed(0)} ms (${quiet.toFixed(0)} ms before), ${answers} answers, ${(painted / points).toFixed(2)} times painted`);
       check(heap <= 250, `the heap has ${heap} MB`);
+      check(answers <= 120, `${answers} answers for ${points} points`);
+      check(painted <= 1.5 * points, `${painted} points painted for ${points}`);
+      check(longest <= Math.max(200, 2 * quiet), `a task took ${longest} ms`);
+      if (process.env.TANDEM_QUIET) check(seconds <= 4 && longest <= 200, `${seconds} s, ${longest} ms`);
       clean(page);
     }, ["--programs", folder]);
   } finally {
     rmSync(folder, { recursive: true, force: true });
+  }
+}
+
+const SCRIPTED = ["--set", "planner.plugin=block-overlap", "--set", "planner.options.corner_control=off", "--set", "motion.time_constant_ms=50",
+  "--set", "policy.script=scripts/policies/corner-time-constant.wasm", "--programs", "examples/policies"];
+
+// A parameter of the policy is turned within its bounds, and the page says what the next run made of it.
+export async function bench() {
+  await inside("examples/machines/mill-3axis.toml", async ({ controller, browser, watch }) => {
+    const page = await open(browser, controller.link);
+    await take(page);
+    await page.click("#tab-programs");
+    await page.click("text=corners.ngc");
+    await page.waitForFunction(() => window.tandem.status.program === "corners.ngc");
+    await page.click("#tab-tuning");
+    const turned = page.locator("#panel-tuning input[type=number][aria-label=corner_error_um]");
+    const [lowest, highest] = [Number(await turned.getAttribute("min")), Number(await turned.getAttribute("max"))];
+    check(lowest < highest, `the bounds are ${lowest} to ${highest}`);
+    // A computer that was too late in a run has made it longer.
+    let inTime = true;
+    const late = async () => {
+      const { missed_periods, starvations, late_ratios } = (await watch.ask("status")).counters;
+      return missed_periods + starvations + late_ratios;
+    };
+    const run = async (value) => {
+      const before = await late();
+      const cells = await runInAnyTime(value);
+      inTime &&= (await late()) === before;
+      return cells;
+    };
+    const runInAnyTime = async (value) => {
+      await turned.fill(String(value));
+      await page.click("[data-name=corner_error_um] >> text=Set");
+      await until("it is set", async () => (await watch.ask("policy-parameters")).parameters.corner_error_um === value);
+      const before = await page.locator("#runs tbody tr").count();
+      await page.click("#start");
+      await until("the run is told", async () => (await page.locator("#runs tbody tr").count()) > before, 60000);
+      await until("it rests", async () => (await watch.ask("status")).state === "ready");
+      const cells = await page.locator("#runs tbody tr").first().locator("td").allTextContents();
+      check((await page.locator("#runs tbody tr").nth(1).textContent()).includes(`corner_error_um ${value}`), "it is not said with what it ran");
+      return cells.slice(1).map((words) => parseFloat(words));
+    };
+    await turned.fill(String(highest * 2));
+    await page.click("[data-name=corner_error_um] >> text=Set");
+    await until("what is out of bounds is refused", async () => (await page.textContent("#says")).includes("must be from"));
+    const [coarse, fine] = [await run(100), await run(20)];
+    console.log(`corner_error_um 100: ${coarse}; 20: ${fine} (s, % of the jerk limit, µm off the path)${inTime ? "" : ", and late"}`);
+    check(fine[2] < coarse[2], `${coarse} ${fine}`);
+    if (inTime) {
+      check(fine[0] > coarse[0], `${coarse} ${fine}`);
+      check((await page.locator("#runs tbody tr").first().textContent()).includes("+"), "the change is not shown");
+    }
+    clean(page);
+  }, SCRIPTED);
+}
+
+// Signals are chosen, at most eight; a trigger is armed, and what lies around it is shown until somebody looks at what comes again.
+export async function capture() {
+  await inside(MACHINE, async ({ controller, browser }) => {
+    const page = await open(browser, controller.link);
+    await take(page);
+    await page.waitForFunction(() => window.tandem.scoped);
+    await page.click("#tab-capture");
+    for (const name of ["feed_mm_s", "x_following_mm", "sigma", "line", "block", "x_fb_mm", "y_fb_mm", "z_fb_mm"]) {
+      await page.click(`.checks label:text-is("${name}")`);
+    }
+    await until("eight are plotted", async () => (await page.locator("#scope-keys span").count()) === 8);
+    await page.click(".checks label:text-is(\"ratio\")");
+    check((await page.locator("#scope-keys span").count()) === 8, "a ninth signal is plotted");
+    await page.waitForFunction(() => window.tandem.scoped);
+    await page.selectOption("[aria-label='Signal of the trigger']", "feed_mm_s");
+    await page.fill("[aria-label='Level']", "5");
+    await page.fill("[aria-label='Seconds before']", "0.1");
+    await page.fill("[aria-label='Seconds after']", "0.2");
+    await page.click("#panel-capture >> text=Arm");
+    await until("it is armed", async () => (await page.textContent("#panel-capture [role=status]")).startsWith("Armed"));
+    await page.evaluate(() => window.tandem.link.ask("mdi", { line: "G1 X20 F1200" }));
+    await until("it is captured", async () => (await page.textContent("#panel-capture [role=status]")).startsWith("Captured"));
+    check((await page.textContent("#scope-hold")) === "Captured", "the picture does not say that it stands");
+    const samples = Number((await page.textContent("#panel-capture [role=status]")).match(/\d+/)[0]);
+    check(samples > 200 && samples <= 310, `${samples} samples`);
+    await page.click("#scope-hold");
+    await until("what comes is shown again", async () => (await page.textContent("#scope-hold")) === "Freeze");
+    clean(page);
+  });
+}
+
+// An alarm stays until somebody says that it was seen; plugins, limits, inputs and outputs are told.
+export async function alarms() {
+  await inside("examples/machines/mill-probe.toml", async ({ controller, browser, watch }) => {
+    const page = await open(browser, controller.link);
+    await take(page);
+    await page.click("#stop");
+    await until("it is an alarm", async () => (await page.textContent("#alarms")) === "1 alarm");
+    await until("nothing is driven", async () => (await page.textContent("#feed")) === "0");
+    await page.click("#next-action");
+    await until("it is ready", async () => ["ready", "homing-needed"].includes((await watch.ask("status")).state));
+    check((await page.textContent("#alarms")) === "1 alarm", "a reset has acknowledged it");
+    await page.click("#alarms");
+    await page.click("#panel-history >> text=Acknowledge all");
+    await until("it is acknowledged", async () => (await watch.ask("alarms")).alarms.length === 0);
+    await until("the page shows it", async () => (await page.getAttribute("#alarms", "class")) === "none");
+    await page.click("#tab-machine");
+    const words = await page.textContent("#panel-machine");
+    for (const name of ["planner", "look-ahead", "driver", "sim", "kinematics"]) check(words.includes(name), `${name}: ${words}`);
+    clean(page);
+  });
+}
+
+// A token that lets look, and stop, and nothing else: what it does not allow is grey and says so.
+export async function looker() {
+  await inside(MACHINE, async ({ controller, browser, watch }) => {
+    const context = await browser.newContext({ viewport: { width: 1280, height: 800 } });
+    const page = Object.assign(await context.newPage(), { errors: [] });
+    page.on("pageerror", (error) => page.errors.push(error.message));
+    // The controller tells in its greeting what the client may.
+    await page.routeWebSocket(/socket/, (route) => {
+      const server = route.connectToServer();
+      server.onMessage((message) => route.send(String(message).replace('"role":"set-up"', '"role":"watch"')));
+    });
+    await page.goto(controller.link);
+    await ready(page);
+    await until("it looks on", async () => (await page.textContent("#lease")) === "Looks on");
+    for (const id of ["lease", "start", "single-block"]) check((await page.getAttribute("#" + id, "aria-disabled")) === "true", `${id} can be pressed`);
+    check(await page.isDisabled("#feed-override"), "the override can be turned");
+    await page.click("#lease", { force: true });
+    await until("it says why", async () => (await page.textContent("#says")).includes("lets it look"));
+    check(!(await page.evaluate(() => window.tandem.hasLease)), "it took control");
+    await page.click("#stop");
+    await until("it has stopped", async () => (await watch.ask("status")).state === "emergency-stop");
+    check(await page.isHidden("#next-action"), "it may reset");
+    clean(page);
+  });
+}
+
+const TABS = 8;
+// Seconds; the long run asks for 600.
+const TABS_FOR_S = Number(process.env.TANDEM_TABS_S || 9);
+
+// Eight pages, each with eight signals of every period: the controller that serves them misses no more periods than one beside it that
+// serves nobody, and neither it nor they grow.
+export async function tabs() {
+  const loop = `G21 G90 F2000\n${"G1 X20 Y10\nG1 X0 Y0\n".repeat(Math.ceil(TABS_FOR_S * 3))}M2\n`;
+  const beside = await serve(MACHINE);
+  const alone = await observer(beside.socket);
+  try {
+    await inside(MACHINE, async ({ controller, browser, watch }) => {
+      const pages = [];
+      for (let i = 0; i < TABS; i++) {
+        const signals = () => localStorage.setItem("signals", JSON.stringify(["x_cmd_mm", "y_cmd_mm", "z_cmd_mm", "x_fb_mm", "y_fb_mm", "z_fb_mm", "feed_mm_s", "sigma"]));
+        const page = await open(browser, controller.link, { before: signals });
+        await page.selectOption("#scope-what", "signals");
+        pages.push(page);
+      }
+      const clients = [watch, alone];
+      for (const client of clients) {
+        await client.ask("lease", { how: "take" });
+        await client.ask("load", { text: loop, name: "to and fro" });
+      }
+      const tickNow = async (client) => (await client.ask("status")).tick;
+      for (const client of clients) await client.ask("start");
+      const look = async () => {
+        const heaps = [];
+        for (const page of pages) {
+          const session = await page.context().newCDPSession(page);
+          await session.send("HeapProfiler.collectGarbage");
+          const { usedSize } = await session.send("Runtime.getHeapUsage");
+          heaps.push(usedSize / 1e6);
+          await session.detach();
+        }
+        const resident = Number(readFileSync(`/proc/${controller.child.pid}/status`, "utf8").match(/VmRSS:\s+(\d+)/)[1]) / 1e3;
+        return { heaps, resident };
+      };
+      const long = TABS_FOR_S * 1000;
+      await until("a third is driven", async () => (await tickNow(watch)) > long / 3, long + 60000);
+      const first = await look();
+      await until("all is driven", async () => (await tickNow(watch)) > long, long * 2 + 60000);
+      const last = await look();
+      const rows = await Promise.all(pages.map((page) => page.evaluate(() => window.tandem.scopedRows)));
+      const missed = [];
+      for (const client of clients) {
+        await client.ask("abort");
+        const job = await until("the job is told", async () => client.events.find((told) => told.event === "job"));
+        missed.push(job.summary.missed_periods / job.summary.samples);
+      }
+      const most = (values) => Math.max(...values).toFixed(1);
+      console.log(`${TABS} pages, ${TABS_FOR_S} s: missed ${(missed[0] * 100).toFixed(2)} % of the periods, ${(missed[1] * 100).toFixed(2)} % beside; heap ${most(first.heaps)} then ${most(last.heaps)} MB, controller ${first.resident.toFixed(1)} then ${last.resident.toFixed(1)} MB; rows ${rows}`);
+      check(rows.every((count) => count > 0), `a page has seen nothing: ${rows}`);
+      // Two processes of one computer differ by what the system gives each, and on a busy one by more.
+      const share = process.env.TANDEM_QUIET ? 0.01 : 0.05;
+      check(missed[0] <= 1.1 * missed[1] + share, `missed ${missed[0]} of the periods, ${missed[1]} beside`);
+      check(last.resident <= first.resident * 1.05 + 4, `the controller grew from ${first.resident} to ${last.resident} MB`);
+      last.heaps.forEach((heap, at) => check(heap <= first.heaps[at] * 1.1 + 4, `page ${at} grew from ${first.heaps[at]} to ${heap} MB`));
+      pages.forEach(clean);
+    });
+  } finally {
+    alone.end();
+    await beside.end();
   }
 }
 
@@ -289,20 +501,49 @@ export async function slow() {
   });
 }
 
-// The pictures of the documentation: node tests/page/run.mjs pictures FOLDER.
-export async function pictures(folder = "docs/pictures") {
+// The pictures of the documentation: node tests/page/run.mjs pictures FOLDER. With a second word, all states in three sizes and both
+// themes, to be looked at.
+export async function pictures(folder = "docs/pictures", all = false) {
   mkdirSync(folder, { recursive: true });
   await inside(MACHINE, async ({ controller, browser, watch }) => {
-    const page = await open(browser, controller.link, { colorScheme: "dark", viewport: { width: 1440, height: 900 } });
+    const shots = [];
+    const sizes = all ? [[1920, 1080], [1280, 800], [768, 1024], [390, 844]] : [[1440, 900]];
+    for (const colorScheme of all ? ["dark", "light"] : ["dark"]) {
+      for (const [width, height] of sizes) {
+        const page = await open(browser, controller.link, { colorScheme, viewport: { width, height } });
+        shots.push({ page, name: `${width}-${colorScheme}` });
+      }
+    }
+    const shoot = async (state) => {
+      await sleep(800);
+      for (const { page, name } of shots) await page.screenshot({ path: join(folder, all ? `${state}-${name}.png` : "operator-page.png") });
+    };
+    const [{ page }] = shots;
+    for (const { page: one } of shots) await one.waitForFunction(() => window.tandem.paintedPoints > 0);
+    if (all) await shoot("empty");
     await take(page);
     await page.click("#tab-programs");
     await page.click("text=serpentine.ngc");
     await page.waitForFunction(() => window.tandem.status.program === "serpentine.ngc");
-    await page.locator("#feed-override").fill("60");
+    await page.locator("#feed-override").fill(all ? "5" : "60");
     await page.click("#tab-jog");
     await page.click("#start");
-    await until("it is half done", async () => (await watch.ask("status")).progress > 0.6);
-    await page.screenshot({ path: join(folder, "operator-page.png") });
+    await until("it is half done", async () => (await watch.ask("status")).progress > (all ? 0.3 : 0.6));
+    await shoot("running");
+    if (!all) return;
+    await page.click("#hold");
+    await until("it is held", async () => (await watch.ask("status")).state === "held");
+    await shoot("held");
+    for (const tab of ["mdi", "programs", "offsets", "tools", "history", "capture", "machine"]) {
+      await page.click("#tab-" + tab);
+      await sleep(200);
+      await page.screenshot({ path: join(folder, `panel-${tab}.png`) });
+    }
+    await page.click("#views [data-view=XY]");
+    await sleep(500);
+    await page.screenshot({ path: join(folder, "plane.png") });
+    await page.click("#stop");
+    await until("it has stopped", async () => (await watch.ask("status")).state === "emergency-stop");
+    await shoot("stopped");
   });
-
 }

@@ -83,5 +83,10 @@ cases! {
     a_page_without_the_token_of_this_process_is_refused: ["token"];
     a_page_that_reads_too_slowly_says_so_and_nobody_waits_for_it: ["slow"];
     three_hundred_thousand_lines_are_drawn: ["many"];
+    eight_pages_with_a_scope_cost_the_machine_nothing: ["tabs"];
+    a_parameter_of_the_policy_is_turned_and_the_next_run_compared: ["bench"];
+    a_capture_around_a_trigger_stands_until_it_is_let_go: ["capture"];
+    an_alarm_stays_until_it_was_seen_and_the_machine_says_what_it_is: ["alarms"];
+    a_token_that_lets_look_lets_nothing_else: ["looker"];
     nobody_is_kept_out_by_contrast_size_or_the_want_of_a_mouse: ["access"];
 }

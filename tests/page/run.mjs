@@ -2,10 +2,10 @@
 import { jog } from "./jog.mjs";
 import * as cases from "./cases.mjs";
 
-const [name, with_] = process.argv.slice(2);
+const [name, ...with_] = process.argv.slice(2);
 try {
-  if (name === "jog") await jog(with_);
-  else await cases[name](with_);
+  if (name === "jog") await jog(...with_);
+  else await cases[name](...with_);
 } catch (error) {
   console.error(error.stack || String(error));
   process.exit(1);

@@ -20,9 +20,9 @@ const PATIENCE: u32 = 6000;
 const LOOK: Duration = Duration::from_millis(5);
 
 /// A controller in a folder of its own.
-struct Served {
+pub struct Served {
     folder: TempDir,
-    child: Child,
+    pub child: Child,
 }
 
 impl Served {
@@ -31,19 +31,30 @@ impl Served {
     }
 
     fn of(machine: &Path) -> Self {
-        let folder = TempDir::new().unwrap();
+        Self::with(TempDir::new().unwrap(), machine, &["--no-state"], |_| ())
+    }
+
+    /// One in `folder`, perhaps of a controller before it, which is ready for work.
+    pub fn with(
+        folder: TempDir,
+        machine: &Path,
+        arguments: &[&str],
+        more: impl FnOnce(&mut Command),
+    ) -> Self {
         let log = File::create(folder.path().join("log")).unwrap();
-        let child = tandem(folder.path())
+        let mut command = tandem(folder.path());
+        command
             .arg("serve")
             .arg("--machine")
             .arg(machine)
-            .args(["--no-state", "--listen", "s"])
+            .args(["--listen", "s"])
+            .args(arguments)
             // How late a busy computer wakes the loop is not what is asked here.
             .args(["--set", "loops.max_missed_periods=1000000"])
             .args(["--set", "loops.max_missed_share=1"])
-            .stderr(log)
-            .spawn()
-            .unwrap();
+            .stderr(log);
+        more(&mut command);
+        let child = command.spawn().unwrap();
         let this = Self { folder, child };
         this.wait("ready", |status| {
             status["state"] == "ready" || status["state"] == "homing-needed"
@@ -51,7 +62,37 @@ impl Served {
         this
     }
 
-    fn at(&self, name: &str) -> PathBuf {
+    /// Kills the process as nothing can prevent; its folder.
+    pub fn kill(mut self) -> TempDir {
+        // It may have ended by itself.
+        let _ = self.child.kill();
+        self.child.wait().unwrap();
+        // What is dropped is an empty folder, and a process that has ended.
+        std::mem::replace(&mut self.folder, TempDir::new().unwrap())
+    }
+
+    /// Asks one after the other, over a connection that then closes; what was answered to each.
+    pub fn ask(&self, requests: &[Value]) -> Vec<Value> {
+        let mut lines = BufReader::new(UnixStream::connect(self.at("s")).unwrap());
+        let ask = |(id, request): (u64, &Value)| {
+            let mut request = request.clone();
+            request["id"] = json!(id);
+            writeln!(lines.get_mut(), "{request}").unwrap();
+            loop {
+                let mut line = String::new();
+                lines.read_line(&mut line).unwrap();
+                let told: Value = serde_json::from_str(&line).unwrap_or_default();
+                assert!(!line.is_empty(), "{request}: the controller is gone");
+                if told["id"] == id && told.get("event").is_none() {
+                    assert!(told.get("ok").is_some(), "{request}: {told}");
+                    return told["ok"].clone();
+                }
+            }
+        };
+        (1..).zip(requests).map(ask).collect()
+    }
+
+    pub fn at(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 
@@ -67,7 +108,7 @@ impl Served {
         Some(serde_json::from_str::<Value>(&line).ok()?["ok"].clone())
     }
 
-    fn wait(&self, what: &str, is: impl Fn(&Value) -> bool) -> Value {
+    pub fn wait(&self, what: &str, is: impl Fn(&Value) -> bool) -> Value {
         for _ in 0..PATIENCE {
             if let Some(status) = self.status().filter(|status| is(status)) {
                 return status;

@@ -29,7 +29,7 @@ fn steps(random: &mut Random, until: u64) -> String {
 
 #[test]
 fn override_steps_at_random_ticks() {
-    for_each_seed("override_steps_at_random_ticks", 250, |seed| {
+    for_each_seed("override_steps_at_random_ticks", 80, |seed| {
         let bench = Bench::text(&program(seed));
         let free = bench.run("");
         let ran = bench.run(&steps(
@@ -47,7 +47,7 @@ fn override_steps_at_random_ticks() {
 
 #[test]
 fn stops_at_random_ticks() {
-    for_each_seed("stops_at_random_ticks", 250, |seed| {
+    for_each_seed("stops_at_random_ticks", 100, |seed| {
         let bench = Bench::text(&program(seed));
         let free = bench.run("").samples.len() as u64;
         let mut random = Random::new(seed ^ 1 << 42);

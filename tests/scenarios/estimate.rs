@@ -281,3 +281,88 @@ fn the_experiment_as_a_program_is_a_program() {
     );
     assert!(program.contains("n 3 side 0.1 repetitions 667"));
 }
+
+#[test]
+fn axes_that_are_not_alike_are_calibrated_each_by_itself() {
+    let unequal = [
+        "--set",
+        "axes.x.max_acceleration_mm_per_s2=300",
+        "--set",
+        "axes.y.max_acceleration_mm_per_s2=900",
+        "--set",
+        "axes.z.max_acceleration_mm_per_s2=500",
+    ];
+    let folder = tempfile::TempDir::new().unwrap();
+    let (output, model) = calibrated(folder.path(), &unequal);
+    let said = text(&output.stdout);
+    assert!(output.status.success(), "{said}{}", text(&output.stderr));
+    assert!(said.contains("along X and"), "{said}");
+    for program in ["raster", "serpentine", "spiral"].map(example) {
+        let with =
+            |model: &str| estimates(&[&[&*program, "--model", model], &unequal[..]].concat());
+        let [estimate, run] =
+            [&*model, "simulate"].map(|model| number(&with(model)[0], "estimated_s"));
+        assert!(
+            (estimate / run - 1.0).abs() < 0.01,
+            "{program}: {estimate} of {run}"
+        );
+    }
+}
+
+#[test]
+fn a_fit_that_is_worse_than_asked_for_is_taken_knowingly() {
+    // Block-overlap that keeps tolerance and limits is of no form that is known.
+    let set = ["--set", "planner.plugin=block-overlap"];
+    let folder = tempfile::TempDir::new().unwrap();
+    let (refused, model) = calibrated(folder.path(), &set);
+    assert_eq!(refused.status.code(), Some(1));
+    let said = text(&refused.stderr);
+    assert!(said.contains("--accept takes the fit as it is"), "{said}");
+    assert!(!Path::new(&model).exists());
+    let (accepted, model) = calibrated(folder.path(), &[&set[..], &["--accept"]].concat());
+    assert!(accepted.status.success(), "{}", text(&accepted.stderr));
+    let said = text(&accepted.stderr);
+    assert!(
+        said.contains("accepted: ") && said.contains("% (rms)"),
+        "{said}"
+    );
+    let written = std::fs::read_to_string(&model).unwrap();
+    assert!(written.contains(" %, accepted\""), "{written}");
+    let estimate = estimates(&[&example("square"), "--model", &model]);
+    assert!(number(&estimate[0], "estimated_s") > 0.0);
+}
+
+#[test]
+fn estimates_stand_beside_what_was_measured() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("measured.csv");
+    let written = |rows: &str| std::fs::write(&path, rows).unwrap();
+    written(
+        "program,seconds,reading_error_s\nraster.ngc,28.1,0.2\nserpentine.ngc,4.2,0.1\nsquare.ngc,1.287,0\n",
+    );
+    let programs = ["raster", "serpentine", "square"].map(example);
+    let measured = path.to_str().unwrap();
+    let mut arguments: Vec<&str> = programs.iter().map(String::as_str).collect();
+    arguments.extend(["--model", "look-ahead", "--measured", measured]);
+    let output = tandem("estimate", &arguments);
+    let said = text(&output.stdout);
+    assert!(output.status.success(), "{said}");
+    let row = |name: &str| {
+        let rows = said
+            .lines()
+            .skip_while(|line| !line.contains("measured, s"));
+        rows.filter(|line| line.contains(name)).collect::<String>()
+    };
+    assert!(row("raster").ends_with("within the reading"), "{said}");
+    assert!(!row("serpentine").contains("within"), "{said}");
+    assert!(
+        said.contains("shorter blocks: ") && said.contains("ms for each block"),
+        "{said}"
+    );
+    written("program,seconds\nraster.ngc,0\n");
+    let refused = text(&tandem("estimate", &arguments).stderr);
+    assert!(
+        refused.contains("measured.csv:2: seconds: 0 is not above zero"),
+        "{refused}"
+    );
+}

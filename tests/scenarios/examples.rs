@@ -76,6 +76,49 @@ fn the_published_path_takes_the_published_time() {
 }
 
 #[test]
+fn the_rough_record_is_the_published_one() {
+    let loop_machine = root().join("examples/machines/two-step-loop.toml");
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("rough.csv");
+    let done = Scenario::of(&example("two-step-square.ngc"))
+        .on(&loop_machine)
+        .with(&["--rough", path.to_str().unwrap()])
+        .run();
+    assert_eq!(done.status(), 0, "{}", done.errors());
+    let mut reader = csv::Reader::from_path(&path).unwrap();
+    let rows: Vec<Vec<f64>> = reader
+        .records()
+        .map(|row| {
+            row.unwrap()
+                .iter()
+                .map(|cell| cell.parse().unwrap())
+                .collect()
+        })
+        .collect();
+    let text = std::fs::read_to_string(root().join("tests/fixtures/cases/000_two_step.json"));
+    let case: serde_json::Value = serde_json::from_str(&text.unwrap()).unwrap();
+    let expect = &case["expect"];
+    // The last one ends with the run.
+    assert_eq!(rows.len() as u64, expect["n_rough"].as_u64().unwrap());
+    for record in expect["rough"].as_array().unwrap() {
+        let row = &rows[record["index"].as_u64().unwrap() as usize];
+        let number = |key: &str| record[key].as_f64().unwrap();
+        for axis in 0..2 {
+            let way_mm = record["dx_mm"][axis].as_f64().unwrap();
+            assert!((row[1 + axis] - way_mm).abs() < 1e-9, "{row:?}: {record}");
+        }
+        let feeds = [
+            row[4] * 60.0 - number("fs_mm_min"),
+            row[5] * 60.0 - number("fe_mm_min"),
+        ];
+        assert!(
+            feeds.iter().all(|off| off.abs() < 1e-6),
+            "{row:?}: {record}"
+        );
+    }
+}
+
+#[test]
 fn the_published_junction_feeds_are_in_the_blocks_file() {
     let loop_machine = root().join("examples/machines/two-step-loop.toml");
     let done = Scenario::of(&example("two-step-arcs.ngc"))

@@ -64,16 +64,7 @@ fn cut(done: &Done, [from, to]: [f64; 2]) -> Cut {
 
 /// Within limits, at ratios up to 2.
 fn assert_within_limits(done: &Done) {
-    assert_eq!(done.status(), 0, "{}", done.errors());
-    for count in [
-        "limit_violations",
-        "guard_stops",
-        "governed_samples",
-        "starvations",
-        "late_ratios",
-    ] {
-        assert_eq!(done.number(count), 0.0, "{count}");
-    }
+    done.assert_driven("", &["governed_samples", "late_ratios", "starvations"]);
     let verdict = done.judge(|options| {
         options.max_ratio = 2.0;
         options.sample_tolerance_mm = Some(2e-6);
@@ -192,7 +183,7 @@ fn delay_noise_and_wrong_inertia_leave_the_loop_stable() {
     let delay = "faults={ seed = 1, wrap = [{ kind = \"delay\", periods = 4, from_tick = 1, until_tick = 1000000 }] }";
     let servo = "driver.options.servo=[{ encoder_counts = 2048, current_noise_ma = 20, friction = { coulomb_nm = 0.06, \
                  viscous_nm_s_per_rad = 6e-4, stribeck_nm = 0.02, stribeck_speed_rad_per_s = 0.4 } }]";
-    for (what, settings, most_nm) in [
+    for (what, settings, max_nm) in [
         ("inertia −20 %", vec![low.as_str()], 6e-3),
         ("inertia +20 %", vec![high.as_str()], 6e-3),
         ("other noise", vec![noise], 6e-3),
@@ -212,7 +203,7 @@ fn delay_noise_and_wrong_inertia_leave_the_loop_stable() {
                 cut.peak_nm
             );
             assert!(
-                cut.rms_error_nm < most_nm && cut.peak_nm < 0.14,
+                cut.rms_error_nm < max_nm && cut.peak_nm < 0.14,
                 "{what} {law}"
             );
         }
@@ -305,7 +296,7 @@ fn the_guard_holds_on_the_path_says_so_and_the_operator_goes_on() {
     let errors = done.errors();
     assert!(
         errors.contains("line 4: the feed strategy force-control asks for a hold")
-            && errors.contains("torque_nm = "),
+            && errors.contains("N·m is above the guard's 0.2000 N·m: torque_nm = "),
         "{errors}"
     );
     let stops = done.summary()["stops"].clone();
@@ -370,7 +361,7 @@ fn tooth_ripple_does_not_reach_the_feed() {
         rates(&[ripple]),
         rates(&[ripple, "feed_strategy.options.teeth=40"]),
     );
-    assert!(whole.0 > 110.0 && whole.1 < 230.0 && rough.0 < 80.0);
+    assert!(whole.0 > 110.0 && whole.1 < 230.0 && rough.0 < 85.0);
 }
 
 #[test]
@@ -574,5 +565,184 @@ fn an_axis_is_identified_with_its_friction_and_cuts_with_it() {
             cut.estimate_rms_nm < 2e-3 && cut.rms_error_nm < 6e-3,
             "a cut with what was identified"
         );
+    }
+}
+
+/// Highest feed driven in lines that are no rapids, mm/min, of the samples from `skip` on.
+fn fastest_mm_per_min(done: &Done, skip: usize) -> f64 {
+    let feeds = done.column("feed_mm_s").into_iter().skip(skip);
+    feeds.fold(0.0, f64::max) * 60.0
+}
+
+#[test]
+fn an_override_raises_the_programmed_feed_and_no_bound_of_the_strategy_and_lowers_whatever_is_asked_for()
+ {
+    let program = || Scenario::text("G21 G90\nS900 M3\nG1 X50 F250\nM5\nM2\n").on(&machine("step"));
+    let ratio = "feed_strategy.options.law=ratio";
+    let feeds = |commands: &str, settings: &[&str]| {
+        let done = with(program(), settings).commands(commands).run();
+        assert_within_limits(&done);
+        let peak_nm = cut(&done, STEP).peak_nm;
+        (
+            fastest_mm_per_min(&done, 24),
+            peak_nm,
+            done.column("t_s").len(),
+        )
+    };
+    // In the middle of the cut of 2 mm, where the law has settled.
+    for law in ["feed_strategy.options.law=pi", ratio] {
+        let (fastest, peak_nm, ticks) = feeds("4000,feed-override,2\n", &[law]);
+        println!("{law}, override 2: {fastest:.1} mm/min, {peak_nm:.4} N·m, {ticks} ms");
+        assert!(
+            fastest <= 300.001,
+            "{law}: {fastest} mm/min, and 300 is the bound"
+        );
+        assert!(peak_nm < 0.14, "{law}: {peak_nm} N·m");
+        let (_, slow_nm, slow_ticks) = feeds("4000,feed-override,0.5\n", &[law]);
+        println!("{law}, override 0.5: {slow_nm:.4} N·m, {slow_ticks} ms");
+        // At half the feed the torque is lower, and the law asks for more, as far as its bounds go.
+        assert!(
+            slow_ticks > ticks * 5 / 4,
+            "{law}: half the feed takes longer"
+        );
+        // Resumed in the material, the tool enters it no faster than it does without an override.
+        let (_, entered_nm, _) = feeds("4000,hold\n6000,resume\n", &[law]);
+        let (fastest, peak_nm, _) = feeds("4000,hold\n5000,feed-override,2\n6000,resume\n", &[law]);
+        println!("{law}, resumed: {peak_nm:.4} N·m, and {entered_nm:.4} N·m without an override");
+        assert!(
+            fastest <= 300.001 && peak_nm < entered_nm + 0.02,
+            "{law}, resumed: {fastest} mm/min, {peak_nm} N·m"
+        );
+    }
+    // In air the programmed feed counts where no other is stated, and it is what an override raises.
+    let free = "feed_strategy.options.max_feed_mm_per_min=450";
+    let text = "G21 G90\nG1 X-20 F200\nM2\n";
+    let unstated = "feed_strategy.options.air_feed_mm_per_min=200";
+    for (air, settings, most) in [
+        ("stated", vec![free, unstated], 200.0),
+        ("300 stated", vec![free], 300.0),
+    ] {
+        let program = Scenario::text(text).on(&machine("step"));
+        let done = with(program, &settings)
+            .commands("500,feed-override,2\n")
+            .run();
+        let fastest = fastest_mm_per_min(&done, 24);
+        assert!(
+            (fastest / most - 1.0).abs() < 0.01,
+            "{air}: {fastest} mm/min"
+        );
+    }
+}
+
+#[test]
+fn friction_that_has_changed_is_learned_again_in_air() {
+    let program = "G21 G90\nS900 M3\nG1 X-25 F150\nX0\nX50\nM5\nM2\n";
+    // The specimen lies on the last 50 mm.
+    let behind =
+        "driver.options.cutting.workpiece.steps=[[58, 2], [68, 3], [78, 4], [88, 2], [98, 0]]";
+    for share in [0.7, 1.0, 1.3] {
+        let servo = format!(
+            "driver.options.servo=[{{ encoder_counts = 8192, current_noise_ma = 5, friction = {{ coulomb_nm = {:?}, \
+             viscous_nm_s_per_rad = {:?}, stribeck_nm = {:?}, stribeck_speed_rad_per_s = 0.4 }} }}]",
+            0.06 * share,
+            6e-4 * share,
+            0.02 * share
+        );
+        let of = |settings: &[&str]| {
+            let done = with(Scenario::text(program).on(&machine("step")), settings).run();
+            assert_eq!(done.status(), 0, "{}", done.errors());
+            (
+                cut(&done, STEP),
+                done.column("sig_friction_ratio").pop().unwrap(),
+            )
+        };
+        let (cut, ratio) = of(&[&servo, behind]);
+        println!(
+            "friction × {share}: mean {:.4} N·m, learned {ratio:.3}",
+            cut.mean_nm
+        );
+        assert!(
+            (cut.mean_nm / 0.1 - 1.0).abs() < 0.05,
+            "{share}: {} N·m",
+            cut.mean_nm
+        );
+        assert!((ratio / share - 1.0).abs() < 0.05, "{share}: {ratio}");
+        if share == 0.7 {
+            let (blind, _) = of(&[
+                &servo,
+                behind,
+                "feed_strategy.options.learning.friction=false",
+            ]);
+            println!("not learned: mean {:.4} N·m", blind.mean_nm);
+            assert!(
+                (blind.mean_nm / 0.1 - 1.0).abs() > 0.1,
+                "{} N·m",
+                blind.mean_nm
+            );
+        }
+    }
+}
+
+#[test]
+fn a_wrong_inertia_is_learned_again_from_rapids_in_air() {
+    let program = "G21 G90\nS900 M3\nG0 X-200\nG0 X0\nG0 X-200\nG0 X0\nG1 X50 F150\nM5\nM2\n";
+    let wrong = "feed_strategy.options.axes.x.inertia_kg_m2=1.5e-4";
+    let shown = [
+        wrong,
+        "feed_strategy.options.learning.inertia_signal=true",
+        "driver.analog=[\"true_torque_nm\"]",
+    ];
+    let done = with(Scenario::text(program).on(&machine("demo")), &shown).run();
+    assert_eq!(done.status(), 0, "{}", done.errors());
+    let found = done.column("sig_inertia_kg_m2");
+    assert_eq!(
+        found[100], 1.5e-4,
+        "what is stated counts until another is sure"
+    );
+    let last = *found.last().unwrap();
+    println!("inertia {last:.4e} kg·m²");
+    assert!((last / 1.842e-4 - 1.0).abs() < 0.02, "{last}");
+}
+
+#[test]
+fn a_gain_whose_margin_the_bus_takes_is_refused() {
+    let run = |gain: f64, periods: u32| {
+        let settings = [
+            "feed_strategy.options.law=p".to_string(),
+            format!("feed_strategy.options.gain_mm_per_min_per_nm={gain}"),
+            format!("driver.options.delay_periods={periods}"),
+        ];
+        let done = scenario("step", &settings.each_ref().map(String::as_str)).run();
+        (done.status(), done.errors())
+    };
+    let stable_up_to = |errors: &str| {
+        let (_, factor) = errors.split_once("stable up to ").expect(errors);
+        factor[..4].parse::<f64>().unwrap()
+    };
+    // The margin that is asked for is 1.25.
+    let most = stable_up_to(&run(8000.0, 0).1) / 1.25 * 8000.0;
+    let near = run(0.95 * most, 0);
+    assert_eq!(near.0, 0, "{}", near.1);
+    let late = run(0.95 * most, 15);
+    assert_eq!(late.0, 1, "{}", late.1);
+    println!(
+        "{most:.0} (mm/min)/(N·m), and with a bus of 15 periods {}",
+        late.1
+    );
+    assert!(stable_up_to(&late.1) < 1.25, "{}", late.1);
+}
+
+#[test]
+fn an_axis_that_starts_or_turns_round_in_air_shows_no_cut() {
+    let observe = "feed_strategy.options.mode=observe";
+    for program in [
+        "G21 G90 G17\nG1 X20 F1000\nG2 X20 Y0 I-20 J0\nG1 X0\nM2\n",
+        "G21 G90\nG1 X5 F150\nX0\nX5 Y5\nX0\nM2\n",
+    ] {
+        let done = with(Scenario::text(program).on(&machine("demo")), &[observe]).run();
+        assert_eq!(done.status(), 0, "{}", done.errors());
+        let max_nm = done.column("sig_torque_nm").into_iter().fold(0.0, f64::max);
+        println!("{max_nm:.4} N·m");
+        assert!(max_nm < 0.025, "a quarter of the reference: {max_nm} N·m");
     }
 }

@@ -33,6 +33,9 @@ pub struct Scenario {
     input: &'static str,
 }
 
+/// What is not counted either where nobody asked for less than the plan.
+pub const UNDISTURBED: [&str; 3] = ["governed_samples", "jerk_relaxed_samples", "starvations"];
+
 /// What a run left.
 pub struct Done {
     pub output: Output,
@@ -230,19 +233,22 @@ impl Done {
         )
     }
 
+    /// Exit status 0, nothing beyond a limit and no stop by the guard; and nothing in the counters `also`. `what` says which run it
+    /// was.
+    pub fn assert_driven(&self, what: &str, also: &[&str]) {
+        assert_eq!(self.status(), 0, "{what}: {}", self.errors());
+        for count in ["limit_violations", "guard_stops"].iter().chain(also) {
+            assert_eq!(self.number(count), 0.0, "{what}: {count}");
+        }
+    }
+
     /// *Within limits* as the design defines it: exit 0, all blocks, end reached, nothing stopped or governed, and the
     /// oracle passes. The path is exact: samples on it, corners cut by no more than a chord between two samples.
     pub fn assert_within_limits(&self) -> Verdict {
-        assert_eq!(self.status(), 0, "{}", self.errors());
-        for count in [
-            "limit_violations",
-            "guard_stops",
-            "governed_samples",
-            "jerk_relaxed_samples",
-            "lost_samples",
-        ] {
-            assert_eq!(self.number(count), 0.0, "{count}");
-        }
+        self.assert_driven(
+            "",
+            &["governed_samples", "jerk_relaxed_samples", "lost_samples"],
+        );
         let chord_mm = self.fastest_mm_per_s() * self.number("fine_period_s") / 2.0;
         let verdict = self.judge(|options| {
             options.sample_tolerance_mm = Some(2e-6);
@@ -254,16 +260,10 @@ impl Done {
 
     /// The same of a planner that rounds corners within the tolerance in force and lets two blocks overlap.
     pub fn assert_within_tolerance(&self) -> Verdict {
-        assert_eq!(self.status(), 0, "{}", self.errors());
-        for count in [
-            "limit_violations",
-            "guard_stops",
-            "governed_samples",
-            "jerk_relaxed_samples",
-            "lost_samples",
-        ] {
-            assert_eq!(self.number(count), 0.0, "{count}");
-        }
+        self.assert_driven(
+            "",
+            &["governed_samples", "jerk_relaxed_samples", "lost_samples"],
+        );
         let verdict = self.judge(overlapping);
         assert!(verdict.passed(), "{}\n{verdict}", self.program.display());
         verdict

@@ -290,10 +290,10 @@ fn an_axis_that_something_stops_is_pushed_with_the_torque_that_homing_may_have()
             .fold(0.0, f64::max)
     };
     // Rated torque for a millimetre; 1800 mm/min are 0.03 mm a period.
-    for (limit, most_mm) in [("20", 0.2), ("75", 0.75)] {
+    for (limit, max_mm) in [("20", 0.2), ("75", 0.75)] {
         let pushed_mm = pushed(&["--set", &format!("homing.z.max_torque_percent={limit}")]);
         assert!(
-            (most_mm - 0.03..=most_mm + 0.031).contains(&pushed_mm),
+            (max_mm - 0.03..=max_mm + 0.031).contains(&pushed_mm),
             "{limit} %: {pushed_mm}"
         );
     }

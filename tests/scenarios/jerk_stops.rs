@@ -143,7 +143,7 @@ fn holds_on_nurbs_take_little_more_than_the_shortest() {
     stops_are_short(
         "watched-nurbs",
         "holds_on_nurbs_take_little_more_than_the_shortest",
-        40,
+        15,
         0.99,
     );
 }

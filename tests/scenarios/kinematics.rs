@@ -87,15 +87,7 @@ fn every_planner_keeps_the_limits_of_the_joints() {
 
 /// Within limits, jerk included, and within the tolerances of the program.
 fn assert_smooth(done: &Done) -> Verdict {
-    assert_eq!(done.status(), 0, "{}", done.errors());
-    for count in [
-        "limit_violations",
-        "guard_stops",
-        "governed_samples",
-        "jerk_relaxed_samples",
-    ] {
-        assert_eq!(done.number(count), 0.0, "{count}");
-    }
+    done.assert_driven("", &["governed_samples", "jerk_relaxed_samples"]);
     let verdict = done.judge(|options| {
         options.checks.push(Check::Jerk);
         (
@@ -470,9 +462,12 @@ fn the_oracle_judges_no_joints_of_kinematics_it_does_not_know() {
 fn homing_is_refused_where_axes_have_no_drive_of_their_own() {
     let home =
         "homing.z={input=12,search_mm_per_min=600,latch_mm_per_min=60,back_off_mm=2,switch_mm=50}";
-    for (name, key) in [
-        ("corexy.toml", "kinematics.plugin"),
-        ("gantry.toml", "joints"),
+    for (name, why) in [
+        (
+            "corexy.toml",
+            "kinematics.plugin: --home is refused: each axis",
+        ),
+        ("gantry.toml", "joints: --home is refused: a gantry squares"),
     ] {
         let scenario = Scenario::text("G21 G90\nG0 X1\nM2\n")
             .on(&machine(name))
@@ -480,9 +475,6 @@ fn homing_is_refused_where_axes_have_no_drive_of_their_own() {
         let done = scenario.with(&["--home"]).run();
         assert_eq!(done.status(), 1, "{}", done.errors());
         let said = done.errors();
-        assert!(
-            said.contains(name) && said.contains(&format!("{key}: --home is refused: each axis")),
-            "{said}"
-        );
+        assert!(said.contains(name) && said.contains(why), "{said}");
     }
 }

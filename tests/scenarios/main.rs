@@ -4,6 +4,8 @@
 
 mod attach;
 mod bad_input;
+#[cfg(feature = "nats")]
+mod batch_nats;
 mod bench;
 mod clients;
 mod clocks;
@@ -33,6 +35,7 @@ mod overlap;
 mod overrides;
 mod own_machine;
 mod pages;
+mod piped;
 mod plan;
 mod plugins;
 mod policy;
@@ -49,6 +52,8 @@ mod report;
 mod resident;
 mod script;
 mod senders;
+mod service;
+mod sight;
 mod signals;
 mod single_block;
 mod smooth;
@@ -62,5 +67,6 @@ mod switched;
 mod system_calls;
 mod times;
 mod trace;
+mod tune;
 mod walks;
 mod walks_draw;

@@ -148,13 +148,13 @@ impl<'a> JerkPlan<'a> {
             .zip(self.lanes)
             .all(|([v, a, j], lane)| {
                 let planned = [sigma * sigma * a, sigma * sigma * sigma * j];
-                let [most_a, most_j] = [
+                let [max_a, max_j] = [
                     WIDER[0] * lane.acceleration,
                     WIDER[1] * lane.jerk.max(planned[1].abs()),
                 ];
                 let acceleration = planned[0] + v * rate;
                 let jerk = planned[1] + 3.0 * a * sigma * rate + v * change;
-                acceleration.abs() <= most_a.max(planned[0].abs()) && jerk.abs() <= most_j
+                acceleration.abs() <= max_a.max(planned[0].abs()) && jerk.abs() <= max_j
             })
     }
 

@@ -5,7 +5,7 @@
 //! junctions. Over one step of the grid u is constant and keeps every axis within its limit at both ends of the step.
 //! Nothing here is shared with the governor.
 
-use crate::plan::{Place, Plan};
+use crate::plan::{Plan, PlanState};
 
 /// Values of σ between 0 and 1.
 const LEVELS: usize = 200;
@@ -55,7 +55,7 @@ impl OptimalStop {
 struct Step {
     from_s: f64,
     length_s: f64,
-    ends: [Place; 2],
+    ends: [PlanState; 2],
 }
 
 fn steps(plan: &Plan, step_s: f64) -> Vec<Step> {

@@ -111,18 +111,26 @@ fn reader_of_pages() -> tempfile::TempDir {
 
 /// What the commands of pages find in place of a release build and of a browser, which prints nothing that a page shows.
 fn stand_ins(folder: &Path) -> String {
+    // Tests of the whole workspace have built it beside the command; alone it would be built with other features, which takes long.
+    let built = Path::new(env!("CARGO_BIN_EXE_tandem")).with_file_name("oracle");
+    let oracle = if built.exists() {
+        format!("\"{}\"", built.display())
+    } else {
+        let root = repository().join("Cargo.toml");
+        let root = root.display();
+        format!("\"$CARGO\" run -q --manifest-path \"{root}\" -p tandem-oracle --")
+    };
     format!(
         r#"tandem() {{ "{folder}/target/release/tandem" "$@"; }}
 cargo() {{
   case "$*" in
     "run --release -p tandem -- "*) shift 5; tandem "$@" ;;
-    "run --release -p tandem-oracle -- "*) shift 5; "$CARGO" run -q --manifest-path "{root}/Cargo.toml" -p tandem-oracle -- "$@" ;;
+    "run --release -p tandem-oracle -- "*) shift 5; {oracle} "$@" ;;
   esac
 }}
 chromium() {{ :; }}
 "#,
         folder = folder.display(),
-        root = repository().display(),
     )
 }
 
@@ -202,19 +210,21 @@ macro_rules! pages {
 
 pages! {
     readme: "README.md", 2;
-    ethercat: "docs/ethercat.md", 1;
+    batch: "docs/batch.md", 1;
+    ethercat: "docs/ethercat.md", 3;
     faults: "docs/faults.md", 2;
-    force_control: "docs/force-control.md", 1;
+    force_control: "docs/force-control.md", 2;
     homing: "docs/homing.md", 1;
     jog: "docs/jog.md", 1;
-    look_ahead: "docs/look-ahead.md", 1;
+    look_ahead: "docs/look-ahead.md", 2;
     machining_time: "docs/machining-time.md", 1;
-    mdi: "docs/mdi.md", 1;
+    mdi: "docs/mdi.md", 2;
     nurbs: "docs/nurbs.md", 1;
     own_machine: "docs/own-machine.md", 3;
     probing: "docs/probing.md", 1;
     simulation: "docs/simulation.md", 4;
     stopping: "docs/stopping.md", 1;
+    tune: "docs/tune.md", 1;
 }
 
 /// A page that gets its first output is judged as well.

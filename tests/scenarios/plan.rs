@@ -9,7 +9,7 @@ pub struct Plan {
 
 /// A place of the plan as the governor must see it: the velocity that is continuous over junctions, and its rate.
 #[derive(Clone, Copy, Debug)]
-pub struct Place {
+pub struct PlanState {
     pub velocity: [f64; 8],
     pub acceleration: [f64; 8],
 }
@@ -92,7 +92,7 @@ impl Plan {
 
     /// Whether an axis brakes at its limit somewhere between two program times: then nothing can be slower.
     pub fn brakes_at_limit(&self, from_s: f64, until_s: f64, limit: &[f64]) -> bool {
-        let brakes = |place: &Place, axis: usize| {
+        let brakes = |place: &PlanState, axis: usize| {
             let along = place.acceleration[axis] * place.velocity[axis].signum();
             place.velocity[axis] != 0.0 && along <= -0.9989 * limit[axis]
         };
@@ -114,14 +114,14 @@ impl Plan {
 
 impl Stretch<'_> {
     /// The place at a program time within the stretch.
-    pub fn at(&self, time_s: f64) -> Place {
+    pub fn at(&self, time_s: f64) -> PlanState {
         let local_s = (time_s - self.start_s).clamp(0.0, self.segment.duration_s);
         let (velocity, acceleration) = (
             self.segment.velocity(local_s),
             self.segment.acceleration(local_s),
         );
         let (lead, rate) = (self.segment.step_velocity, self.segment.step_acceleration);
-        Place {
+        PlanState {
             velocity: std::array::from_fn(|axis| {
                 velocity[axis] - lead[axis] + rate[axis] * local_s
             }),

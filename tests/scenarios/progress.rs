@@ -74,7 +74,7 @@ fn expect_no_dip(ran: &Ran, feeds: &[f64], ratio: f64) -> Result<(), String> {
 fn a_lower_feed_under_a_reduced_ratio_is_met_without_a_dip_on_any_machine() {
     for_each_seed(
         "a_lower_feed_under_a_reduced_ratio_is_met_without_a_dip_on_any_machine",
-        150,
+        50,
         |seed| {
             let mut random = Random::new(seed);
             let (feeds, text) = falling_and_rising(&mut random);

@@ -26,6 +26,71 @@ fn the_python_client_passes_its_tests() {
     assert!(said.contains("Ran 6 tests"), "{said}");
 }
 
+/// As `pip install scripts/python` does it, into an environment of its own, and without a network.
+#[test]
+fn pip_installs_the_client() {
+    let folder = tempfile::TempDir::new().unwrap();
+    let run = |program: &std::path::Path, arguments: &[&str]| {
+        Command::new(program)
+            .args(arguments)
+            .current_dir(folder.path())
+            .output()
+            .map_err(|e| e.to_string())
+    };
+    let able = run(
+        "python3".as_ref(),
+        &["-c", "import ensurepip, venv, setuptools, wheel"],
+    );
+    if !able.is_ok_and(|output| output.status.success()) {
+        println!("skipped: python3 has no ensurepip, venv, setuptools or wheel");
+        return;
+    }
+    // A build writes beside its source.
+    let copied = Command::new("cp")
+        .arg("-r")
+        .args([root().join("scripts/python"), folder.path().join("source")])
+        .status()
+        .unwrap();
+    assert!(copied.success());
+    let made = run(
+        "python3".as_ref(),
+        &["-m", "venv", "--system-site-packages", "venv"],
+    )
+    .unwrap();
+    assert!(
+        made.status.success(),
+        "{}",
+        String::from_utf8_lossy(&made.stderr)
+    );
+    let python = folder.path().join("venv/bin/python");
+    let pip = [
+        "-m",
+        "pip",
+        "install",
+        "--no-index",
+        "--no-build-isolation",
+        "--no-deps",
+        "./source",
+    ];
+    let installed = run(&python, &pip).unwrap();
+    let said = String::from_utf8_lossy(&installed.stderr);
+    assert!(installed.status.success(), "{said}");
+    let found = run(
+        &python,
+        &[
+            "-c",
+            "import tandem_client; print(tandem_client.__file__, tandem_client.Client.__name__)",
+        ],
+    )
+    .unwrap();
+    let said = String::from_utf8_lossy(&found.stdout);
+    assert!(
+        said.contains("venv/lib") && said.ends_with("Client\n"),
+        "{said}{}",
+        String::from_utf8_lossy(&found.stderr)
+    );
+}
+
 #[test]
 fn its_types_are_right() {
     let mypy = Command::new("python3")

@@ -100,7 +100,7 @@ pub fn attempted(attempt: impl FnOnce() + std::panic::UnwindSafe) -> Result<(), 
 
 #[test]
 fn random_programs_run_within_limits() {
-    for_each_seed("random_programs_run_within_limits", 250, |seed| {
+    for_each_seed("random_programs_run_within_limits", 80, |seed| {
         attempted(|| {
             let done = Scenario::text(&program(seed)).run();
             done.assert_within_limits();
@@ -111,7 +111,7 @@ fn random_programs_run_within_limits() {
 
 #[test]
 fn random_holds_and_stalls_keep_the_limits() {
-    for_each_seed("random_holds_and_stalls_keep_the_limits", 150, |seed| {
+    for_each_seed("random_holds_and_stalls_keep_the_limits", 60, |seed| {
         let lines = holds_and_stalls(&mut Random::new(seed | 1 << 40));
         attempted(|| {
             Scenario::text(&program(seed))

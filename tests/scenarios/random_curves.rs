@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::harness::{Scenario, root};
+use crate::harness::{Scenario, UNDISTURBED, root};
 use crate::random::{Random, attempted};
 use crate::replay::for_each_seed;
 
@@ -254,7 +254,7 @@ fn random_curves_run_within_limits() {
     for form in ["scan", "windowed"] {
         for_each_seed("random_curves_run_within_limits", 3, |seed| {
             attempted(|| {
-                let done = on_the_demo_machine(&program(seed, 200), form).run();
+                let done = on_the_demo_machine(&program(seed, 80), form).run();
                 done.assert_within_limits();
                 assert_eq!(done.number("starvations"), 0.0);
             })
@@ -273,7 +273,7 @@ fn random_curves_are_held_and_overridden_within_limits() {
                 attempted(|| {
                     let mut random = Random::new(seed);
                     let mut commands = String::new();
-                    for n in 0..60 {
+                    for n in 0..24 {
                         let tick = 750 * n + random.below(500);
                         match random.below(3) {
                             0 => writeln!(commands, "{tick},hold\n{},resume", tick + 150).unwrap(),
@@ -285,19 +285,10 @@ fn random_curves_are_held_and_overridden_within_limits() {
                             .unwrap(),
                         }
                     }
-                    let done = on_the_demo_machine(&program(seed, 200), form)
+                    let done = on_the_demo_machine(&program(seed, 80), form)
                         .commands(&commands)
                         .run();
-                    assert_eq!(done.status(), 0, "{}", done.errors());
-                    for count in [
-                        "limit_violations",
-                        "guard_stops",
-                        "starvations",
-                        "governed_samples",
-                        "jerk_relaxed_samples",
-                    ] {
-                        assert_eq!(done.number(count), 0.0, "{count}");
-                    }
+                    done.assert_driven("", &UNDISTURBED);
                     let verdict = done.judge(|options| {
                         options.sample_tolerance_mm = Some(2e-6);
                         options.vertex_tolerance_mm = Some(0.3);

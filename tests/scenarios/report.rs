@@ -17,8 +17,10 @@ fn the_report_opens_in_a_browser() {
         .run();
     done.assert_within_limits();
     let html = std::fs::read_to_string(&page).unwrap();
+    // The licence of the plots' library says where it comes from; that is the only address in the page.
+    let own = html.replacen("https://github.com/leeoniya/uPlot", "", 1);
     assert!(
-        !html.contains("http://") && !html.contains("https://"),
+        !own.contains("http://") && !own.contains("https://"),
         "the page fetches something"
     );
     if !Path::new(BROWSER).exists() {

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use tandem_policy::{Bounds, Budget, Counters, Engine, Facts, Period, Policy, Tuning};
-use tandem_sdk::{Axes, AxisVector, Block, BlockKind};
+use tandem_sdk::{AxisVector, Block, BlockKind};
 use tempfile::TempDir;
 
 use crate::harness::{mill, root};
@@ -44,12 +44,9 @@ fn behaviour(module: &Path) -> (Vec<Tuning>, Vec<Option<f64>>, Counters) {
         .unwrap()
         .compile(&std::fs::read(module).unwrap())
         .unwrap();
-    let axes = Axes::new(&[('X', false), ('Y', false)]).unwrap();
     let facts = Facts {
-        axes,
-        time_constant_s: 0.05,
-        path_tolerance_mm: 0.01,
-        rough_period_s: 0.008,
+        signals: vec!["spindle_temperature_c".to_string()],
+        ..Facts::default()
     };
     let mut policy =
         Policy::new(script, vec![], Budget::default(), Bounds::default(), &facts).unwrap();
@@ -95,6 +92,7 @@ fn the_scripts_rebuilt_behave_as_the_modules_beside_them() {
         "gentle-start.c",
         "load-feed.ts",
         "material-feed.ts",
+        "arm-reach",
     ] {
         let source = root().join("scripts/policies").join(source);
         let out = folder.path().join("rebuilt.wasm");

@@ -110,7 +110,7 @@ fn with_a_jerk_limit_it_rests_at_every_line_too() {
             // Just before it goes on.
             let off = (x[500 * (n + 1) - 5] - end_x).hypot(y[500 * (n + 1) - 5] - end_y);
             assert!(
-                off < 0.05,
+                off < 0.002,
                 "{form}: rest {n} is {off} mm off the end of its line"
             );
         }

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use tandem_oracle::Check;
 
-use crate::harness::{Done, Scenario, root};
+use crate::harness::{Done, Scenario, UNDISTURBED, root};
 
 /// Times of others on the same tool paths, s, measured once (docs/smooth-planner.md): the first two leave the acceleration
 /// limit at corners, the third has no jerk limit.
@@ -100,19 +100,10 @@ fn case(name: &str) -> String {
 
 #[test]
 fn cases_are_driven_near_the_best_time_within_limits() {
-    for (name, most_s) in [("corner90", 1.375), ("zigzag", 1.40), ("arcline", 1.065)] {
+    for (name, max_s) in [("corner90", 1.375), ("zigzag", 1.40), ("arcline", 1.065)] {
         let machine = root().join("examples/machines/mill-3axis-smooth.toml");
         let done = Scenario::text(&case(name)).on(&machine).run();
-        assert_eq!(done.status(), 0, "{}", done.errors());
-        for count in [
-            "limit_violations",
-            "guard_stops",
-            "governed_samples",
-            "jerk_relaxed_samples",
-            "starvations",
-        ] {
-            assert_eq!(done.number(count), 0.0, "{name}: {count}");
-        }
+        done.assert_driven(name, &UNDISTURBED);
         let verdict = done.judge(|options| {
             options.checks.push(Check::Jerk);
             options.feed_window_s = Some(0.0);
@@ -125,7 +116,7 @@ fn cases_are_driven_near_the_best_time_within_limits() {
             .count();
         println!("{name}: {:.3} s", done.number("motion_time_s"));
         assert!(
-            done.number("motion_time_s") <= most_s && stops == 0,
+            done.number("motion_time_s") <= max_s && stops == 0,
             "{name}: {stops} stops"
         );
     }

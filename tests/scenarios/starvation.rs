@@ -149,7 +149,7 @@ impl Drawn {
 fn no_planner_starves_on_any_machine_where_the_rough_loop_is_never_late() {
     for_each_seed(
         "no_planner_starves_on_any_machine_where_the_rough_loop_is_never_late",
-        6,
+        3,
         |seed| {
             let wrong: Vec<String> = PLANNERS
                 .into_iter()

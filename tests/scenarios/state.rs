@@ -1,5 +1,6 @@
 //! `tandem state`: a shop's files come in, are shown, and go out again.
 
+use std::fmt::Write as _;
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -155,4 +156,73 @@ fn shells_and_man_know_every_command() {
             "the page lacks {command}"
         );
     }
+}
+
+/// Drives lines on a controller with a state file, on the virtual clock, and tells where the machine has come to.
+fn driven(folder: &Path, lines: &[&str]) -> String {
+    let machine =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-3axis.toml");
+    let mut script =
+        String::from("{\"tick\":1000,\"say\":{\"id\":1,\"request\":\"lease\",\"how\":\"take\"}}\n");
+    for (nth, line) in lines.iter().enumerate() {
+        let say = format!("{{\"id\":2,\"request\":\"mdi\",\"line\":\"{line}\"}}");
+        // A string takes whatever is written to it.
+        let _ = writeln!(script, "{{\"tick\":{},\"say\":{say}}}", 2000 + 3000 * nth);
+    }
+    let (tick, say) = (
+        2000 + 3000 * lines.len(),
+        "{\"id\":9,\"request\":\"status\"}",
+    );
+    let _ = writeln!(script, "{{\"tick\":{tick},\"say\":{say}}}");
+    std::fs::write(folder.join("script"), script).unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_tandem"))
+        .args([
+            "serve",
+            "--clock",
+            "virtual",
+            "--requests",
+            "script",
+            "--state",
+            "kept.sqlite",
+            "--machine",
+        ])
+        .arg(machine)
+        .current_dir(folder)
+        .output()
+        .unwrap();
+    let said = text(&output.stdout);
+    assert!(
+        output.status.success() && !said.contains("\"error\""),
+        "{said}{}",
+        text(&output.stderr)
+    );
+    let status = said
+        .lines()
+        .rfind(|line| line.contains("\"id\":9"))
+        .unwrap();
+    let status: serde_json::Value = serde_json::from_str(status).unwrap();
+    let place = &status["told"]["ok"]["position"];
+    ["x_mm", "y_mm", "z_mm"]
+        .map(|axis| place[axis].to_string())
+        .join(" ")
+}
+
+/// G28.1 and G30.1 store where the machine stands, and G28 and G30 of another process go there.
+#[test]
+fn stored_positions_last_from_process_to_process() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let stored = driven(
+        folder,
+        &["G0 X5 Y6", "G28.1", "G0 X-7 Y8 Z2", "G30.1", "G0 X0 Y0 Z0"],
+    );
+    assert_eq!(stored, "0.0 0.0 0.0");
+    assert_eq!(driven(folder, &["G30"]), "-7.0 8.0 2.0");
+    assert_eq!(driven(folder, &["G28"]), "5.0 6.0 0.0");
+    let shown = state(folder, "show", &["--state", "kept.sqlite"]);
+    let shown = text(&shown.stdout);
+    assert!(
+        shown.contains("G30  x_mm -7.0000  y_mm 8.0000  z_mm 2.0000"),
+        "{shown}"
+    );
 }

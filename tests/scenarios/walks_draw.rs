@@ -193,7 +193,7 @@ fn gantry(random: &mut Random, machine: &mut String, lanes: &mut Vec<Lane>) {
 }
 
 /// A walk of the override every 10 ms, holds, resumes, stalls and single lines; everything is let go in the end.
-fn commands(random: &mut Random, ticks: f64, period_s: f64, most_ratio: f64) -> String {
+fn commands(random: &mut Random, ticks: f64, period_s: f64, max_ratio: f64) -> String {
     let mut lines: Vec<(u64, String)> = vec![];
     let last = ticks.max(300.0) as u64;
     let step = (0.01 / period_s).ceil() as u64;
@@ -202,7 +202,7 @@ fn commands(random: &mut Random, ticks: f64, period_s: f64, most_ratio: f64) -> 
         let mut ratio = 1.0f64;
         let reach = [0.05, 0.3, 1.0][random.below(3) as usize];
         for n in 0..last / step {
-            ratio = (ratio + random.between(-reach, reach)).clamp(0.0, most_ratio);
+            ratio = (ratio + random.between(-reach, reach)).clamp(0.0, max_ratio);
             if form != 3 || random.below(20) == 0 {
                 lines.push((
                     n * step + random.below(step.max(1)),
@@ -291,13 +291,13 @@ impl<'a> Program<'a> {
         }
     }
 
-    /// Blocks for about `most_s`; gives how long they take at least.
-    fn write(&mut self, most_s: f64) -> f64 {
+    /// Blocks for about `max_s`; gives how long they take at least.
+    fn write(&mut self, max_s: f64) -> f64 {
         self.feed();
         let mut nominal_s = 0.0;
         for _ in 0..3 + self.random.below(60) {
             nominal_s += self.element();
-            if nominal_s > most_s {
+            if nominal_s > max_s {
                 break;
             }
         }

@@ -1,9 +1,10 @@
 //! The command line.
 
+mod batch;
 #[cfg(feature = "ethercat")]
 mod bus;
 mod machine;
-mod place;
+mod machine_source;
 mod plugin;
 mod state;
 mod trace;
@@ -12,11 +13,15 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use clap::{Args as Group, Parser, Subcommand, ValueEnum};
+use tandem_session::operator::Role;
 
+#[cfg(feature = "nats")]
+pub use batch::Worker;
+pub use batch::{Batch, BatchFolder, Nats, Submit, Tune};
 #[cfg(feature = "ethercat")]
 pub use bus::{Bus, Sdo, Which};
 pub use machine::{Format, ImportMachine, MachineCommand, NewMachine};
-pub use place::{Connect, Place};
+pub use machine_source::{Connect, MachineSource};
 pub use plugin::{Kind, Plugin};
 pub use state::{Files, Of, State};
 pub use trace::Trace;
@@ -55,6 +60,11 @@ pub enum Command {
     Estimate(Estimate),
     /// Find out by an experiment how a control takes its time, for estimates
     Calibrate(Calibrate),
+    /// Find the settings of a machine that are best for some programs, by simulating them
+    Tune(Tune),
+    /// Simulate many programs with many settings on many machines
+    #[command(subcommand)]
+    Batch(Batch),
     /// Find inertia and friction of an axis by air runs, for the feed strategy force-control
     Identify(Identify),
     /// Look into traces: export, info, diff
@@ -131,10 +141,10 @@ pub struct Session {
     reason = "each is a switch of the command line"
 )]
 pub struct Run {
-    /// The part program; - reads it from standard input
+    /// The part program; - drives lines of standard input as they come
     pub program: PathBuf,
     #[command(flatten)]
-    pub place: Place,
+    pub place: MachineSource,
     /// Leave out the lines that begin with /
     #[arg(long)]
     pub block_delete: bool,
@@ -162,7 +172,7 @@ pub struct Run {
     #[command(flatten)]
     pub operator: Operator,
     /// Write every sample; a name that ends in .ttr asks for the binary format. - is standard output, here and for one of
-    /// the four files below; what the run says goes to standard error then
+    /// the five files below; what the run says goes to standard error then
     #[arg(long, value_name = "F.csv|F.ttr")]
     pub trace: Option<PathBuf>,
     /// Write the summary
@@ -174,6 +184,9 @@ pub struct Run {
     /// Write every block as it was driven
     #[arg(long, value_name = "F.csv")]
     pub blocks: Option<PathBuf>,
+    /// Write the motion by rough periods: the displacement of every axis, and the feed at both ends
+    #[arg(long, value_name = "F.csv")]
+    pub rough: Option<PathBuf>,
     /// Write every switch of spindle, coolant and outputs, and what switched: program, abort, fault or emergency stop
     #[arg(long, value_name = "F.csv")]
     pub events: Option<PathBuf>,
@@ -193,6 +206,12 @@ pub struct Operator {
     /// The token that clients over TCP name first; a random one is made where the file does not exist
     #[arg(long, value_name = "F", requires = "listen_tcp")]
     pub token_file: Option<PathBuf>,
+    /// A token like it for clients that drive the machine and do not change what lasts
+    #[arg(long, value_name = "F")]
+    pub operate_token_file: Option<PathBuf>,
+    /// A token like it for clients that look, and stop the machine
+    #[arg(long, value_name = "F")]
+    pub watch_token_file: Option<PathBuf>,
 }
 
 #[derive(Group)]
@@ -243,6 +262,9 @@ pub struct Serve {
     /// What clients ask, by fine periods: JSON lines as docs/controller.md has them
     #[arg(long, value_name = "F.jsonl")]
     pub requests: Option<PathBuf>,
+    /// Writes what clients say, by fine periods, for --requests of a replay
+    #[arg(long, value_name = "F.jsonl", conflicts_with = "requests")]
+    pub arrivals: Option<PathBuf>,
     /// For tests: fine periods that are counted before the first
     #[arg(long, value_name = "N", default_value = "0", hide = true)]
     pub uptime_periods: u64,
@@ -271,7 +293,7 @@ pub struct Ask {
 #[derive(Group)]
 pub struct Mdi {
     #[command(flatten)]
-    pub place: Place,
+    pub place: MachineSource,
     /// Leave out the lines that begin with /
     #[arg(long)]
     pub block_delete: bool,
@@ -282,7 +304,7 @@ pub struct Mdi {
 #[derive(Group)]
 pub struct Jog {
     #[command(flatten)]
-    pub place: Place,
+    pub place: MachineSource,
     #[command(flatten)]
     pub session: Session,
 }
@@ -304,7 +326,7 @@ pub struct Check {
 #[derive(Group)]
 pub struct Home {
     #[command(flatten)]
-    pub place: Place,
+    pub place: MachineSource,
     /// Reset faults in which drives stand before they are enabled
     #[arg(long)]
     pub reset: bool,
@@ -335,6 +357,9 @@ pub struct Estimate {
     /// Write a list for programs instead of a table for people
     #[arg(long)]
     pub json: bool,
+    /// Say how the estimates compare with what was measured: the columns program, seconds and reading_error_s of a CSV file
+    #[arg(long, value_name = "F.csv")]
+    pub measured: Option<PathBuf>,
     /// Draw the length of the blocks against the feed reached in them
     #[arg(long, value_name = "F.html", value_parser = file_name)]
     pub report: Option<PathBuf>,
@@ -350,12 +375,18 @@ pub struct Calibrate {
     /// Fit to the times of a file instead of an experiment; docs/machining-time.md has its columns
     #[arg(long, value_name = "F.csv")]
     pub from: Option<PathBuf>,
+    /// Fit to the log of a control that has driven what --program writes: the columns t_s and line of a CSV file, such as a trace
+    #[arg(long, value_name = "F.csv", conflicts_with_all = ["from", "program"])]
+    pub log: Option<PathBuf>,
     /// Only write the experiment as a program, to be run and timed at another control
     #[arg(long, value_name = "F.ngc", conflicts_with_all = ["out", "from", "model"], value_parser = file_name)]
     pub program: Option<PathBuf>,
     /// Fit this form instead of the one that fits best
     #[arg(long)]
     pub model: Option<Form>,
+    /// Take the fit though it is worse than what is asked for; the model file says by how much
+    #[arg(long, conflicts_with = "program")]
+    pub accept: bool,
     /// The clock that drives the experiment; without it that of the driver: virtual for simulated drives, wall for real ones
     #[arg(long)]
     pub clock: Option<Clock>,
@@ -470,6 +501,29 @@ pub enum Clock {
 }
 
 impl Operator {
+    /// The files of the tokens that let do less, and what.
+    pub fn role_token_files(&self) -> Vec<(PathBuf, Role)> {
+        let files = [
+            (&self.operate_token_file, Role::Operate),
+            (&self.watch_token_file, Role::Watch),
+        ];
+        files
+            .into_iter()
+            .filter_map(|(file, role)| Some((file.clone()?, role)))
+            .collect()
+    }
+
+    /// Why tokens of roles have no door, where they have none.
+    pub fn check_tokens(&self, has_page: bool) -> Result<(), String> {
+        if has_page || self.listen_tcp.is_some() || self.role_token_files().is_empty() {
+            return Ok(());
+        }
+        Err(
+            "--operate-token-file and --watch-token-file go with a door that asks for tokens"
+                .into(),
+        )
+    }
+
     /// Whether no client can come.
     pub fn is_nowhere(&self) -> bool {
         self.listen.is_none() && self.listen_tcp.is_none()

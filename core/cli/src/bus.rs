@@ -5,7 +5,8 @@ use std::io::Write;
 use std::path::Path;
 
 use tandem_ethercat::{
-    Found, Object, Options, Survey, Value, Watch, Watched, context_of, number, object, watch,
+    Found, Object, Options, Request, Survey, Value, Watch, Watched, ask_whoever_drives, context_of,
+    number, object, watch,
 };
 use tandem_machine::Machine;
 use tandem_sdk::PluginOptions;
@@ -141,10 +142,30 @@ fn scan(which: &Which) -> Result<u8, Box<dyn Error>> {
     Ok(0)
 }
 
+/// Has the process do it that drives the bus; none where nobody drives it.
+fn ask(
+    which: &Which,
+    place: usize,
+    (index, sub): (u16, u8),
+    value: Option<Value>,
+) -> Result<Option<Value>, Box<dyn Error>> {
+    let interface = match (&which.interface, &which.machine) {
+        (Some(interface), _) => interface.clone(),
+        (None, Some(path)) => options_of(path)?.0.interface,
+        (None, None) => return Ok(None),
+    };
+    let object = Object { place, index, sub };
+    let answer = ask_whoever_drives(&interface, &Request { object, value });
+    Ok(answer.transpose()?)
+}
+
 fn read(which: &Which, device: usize, text: &str) -> Result<u8, Box<dyn Error>> {
     let (index, sub) =
         object(text).ok_or_else(|| format!("{text:?} is no object: 0x6085, or 0x6099:1"))?;
-    let value = survey(which)?.read(device, index, sub)?;
+    let value = match ask(which, device, (index, sub), None)? {
+        Some(value) => value,
+        None => survey(which)?.read(device, index, sub)?,
+    };
     writeln!(std::io::stdout(), "{index:04X}:{sub:02X} = {value}")?;
     Ok(0)
 }
@@ -165,7 +186,10 @@ fn write(
     let signed =
         fits.ok_or_else(|| format!("{value} is no number of {bits} bits; bits are 8, 16 or 32"))?;
     let number = (signed & ((1 << bits) - 1)) as u32;
-    survey(which)?.write(device, index, sub, Value { number, bits })?;
+    let value = Value { number, bits };
+    if ask(which, device, (index, sub), Some(value))?.is_none() {
+        survey(which)?.write(device, index, sub, value)?;
+    }
     writeln!(
         std::io::stdout(),
         "{index:04X}:{sub:02X} = 0x{number:x}, read back"

@@ -28,11 +28,12 @@ pub fn calibrate(options: &args::Calibrate) -> Result<u8, Box<dyn Error>> {
         return program(path, &machine);
     }
     let measured = measure(options, &machine)?;
-    let tick_s = options.from.is_none().then_some(machine.fine_period_s);
+    let elsewhere = options.from.is_some() || options.log.is_some();
+    let tick_s = (!elsewhere).then_some(machine.fine_period_s);
     let fits = fit_all(&measured.timed, tick_s);
     let evidence = Evidence::of(&measured.timed);
     print(&table(&measured, &evidence, &fits));
-    match chosen(options.model, &measured, &evidence, &fits) {
+    match chosen(options, &measured, &evidence, &fits) {
         Ok(fitted) => {
             print(&residuals(&fitted, &measured.timed));
             if let Err(cause) = write(options, &machine, &fitted) {
@@ -63,7 +64,7 @@ fn program(path: &Path, machine: &Machine) -> Result<u8, Box<dyn Error>> {
     let (count, name) = (experiment.polygons.len(), path.display());
     print(&format!(
         "{name}: {count} polygons, an M0 before each; write what they take to a CSV file with the columns\n\
-         n,side_mm,repetitions,seconds\nand come back with --from\n"
+         n,side_mm,repetitions,seconds\nand come back with --from, or with --log where the control logs times and lines\n"
     ));
     left_out(&experiment);
     Ok(0)
@@ -82,6 +83,14 @@ fn measure(options: &args::Calibrate, machine: &Machine) -> Result<Measured, Box
     if let Some(path) = &options.from {
         return Ok(Measured {
             timed: measurements::read(path)?,
+            ..Measured::default()
+        });
+    }
+    if let Some(path) = &options.log {
+        let experiment = Experiment::new(machine, BLOCKS_TIMED)?;
+        let timed = experiment.timed(&measurements::read_log(path)?);
+        return Ok(Measured {
+            timed: timed.map_err(|cause| format!("{}: {cause}", path.display()))?,
             ..Measured::default()
         });
     }
@@ -145,12 +154,12 @@ fn kind(evidence: &Evidence, fits: &[Fitted]) -> &'static str {
 
 /// The model to be written; why there is none.
 fn chosen(
-    form: Option<Form>,
+    options: &args::Calibrate,
     measured: &Measured,
     evidence: &Evidence,
     fits: &[Fitted],
 ) -> Result<Fitted, String> {
-    let kind = kind(evidence, fits);
+    let (form, kind) = (options.model, kind(evidence, fits));
     print(&format!("this is {kind}\n"));
     if form == Some(Form::Regression) {
         return regression(measured, evidence, fits, kind);
@@ -169,9 +178,16 @@ fn chosen(
         return Ok(best.clone());
     }
     let name = best.choice.name();
+    if options.accept {
+        say!(
+            "accepted: {name} is off by {:.1} % (rms) of the times that were measured, and so will be what it estimates",
+            100.0 * best.rms
+        );
+        return Ok(best.clone());
+    }
     Err(format!(
         "the best fit is {name}, with R2 {:.4} and a residual of {:.1} % (rms), where {MIN_R2} and {:.0} % are asked for: \
-         this is {kind}. A machine that Tandem drives is estimated exactly with --model simulate.",
+         this is {kind}. A machine that Tandem drives is estimated exactly with --model simulate; --accept takes the fit as it is.",
         best.feeds.r2,
         100.0 * best.rms,
         100.0 * MAX_RMS
@@ -267,10 +283,12 @@ fn write(
     let source = options
         .from
         .as_ref()
+        .or(options.log.as_ref())
         .map_or_else(|| machine.name.clone(), |from| from.display().to_string());
     let (r2, rms) = (fitted.feeds.r2, 100.0 * fitted.rms);
+    let accepted = if fitted.is_good() { "" } else { ", accepted" };
     let calibrated = format!(
-        "{source}: {} polygons, R2 {r2:.6}, rms {rms:.3} %",
+        "{source}: {} polygons, R2 {r2:.6}, rms {rms:.3} %{accepted}",
         fitted.residuals.len()
     );
     let text = model_file::write(&fitted.choice, &calibrated).ok_or("this model has no file")?;

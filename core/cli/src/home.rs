@@ -2,8 +2,8 @@
 
 use std::error::Error;
 
-use tandem_host::{Run, RunObserver, Switches};
-use tandem_machine::Machine;
+use tandem_host::{Apart, Run, RunObserver, Switches};
+use tandem_machine::{AxisHoming, Machine};
 use tandem_rings::Sample;
 use tandem_sdk::{Event, EventKind};
 use tandem_session::HOMING;
@@ -29,6 +29,10 @@ pub fn home(options: &args::Home) -> Result<u8, Box<dyn Error>> {
         }
     }
     let registry = built_in::registry()?;
+    if let Some(apart) = Apart::of(&machine, &registry)? {
+        // Its joints are shown by their names, and recorded as axes of their own.
+        machine = apart.machine;
+    }
     let clock = clock::of(options.clock, &machine, &registry);
     let switches = Switches {
         reset: options.reset,
@@ -104,12 +108,20 @@ impl RunObserver for Observer {
 
 /// Says where each axis was found.
 pub struct Corrections {
-    /// Letter, home position, internal units a unit of messages, and that unit, per axis.
-    axes: Vec<(char, f64, f64, &'static str)>,
+    /// Name, home position, internal units a unit of messages, and that unit, per axis.
+    axes: Vec<(String, f64, f64, &'static str)>,
 }
 
 impl Corrections {
     pub fn new(machine: &Machine) -> Self {
+        let name = |axis: usize| {
+            let foot = |of: &&AxisHoming| of.axis == axis && of.foot.is_some();
+            let joint = machine.homing.iter().find(foot);
+            joint.map_or_else(
+                || machine.axes.letter(axis).to_ascii_lowercase().to_string(),
+                |of| of.table(&machine.axes, &machine.joints),
+            )
+        };
         let axis = |axis: usize| {
             let rotary = machine.axes.is_rotary(axis);
             let (scale, unit) = if rotary {
@@ -117,12 +129,7 @@ impl Corrections {
             } else {
                 (1.0, "mm")
             };
-            (
-                machine.axes.letter(axis).to_ascii_lowercase(),
-                machine.home[axis],
-                scale,
-                unit,
-            )
+            (name(axis), machine.home[axis], scale, unit)
         };
         Self {
             axes: (0..machine.axes.count()).map(axis).collect(),
@@ -130,21 +137,21 @@ impl Corrections {
     }
 
     pub fn event(&self, event: &Event) {
-        let Some((letter, home, scale, unit)) = self.axes.get(event.index.unsigned_abs() as usize)
+        let Some((name, home, scale, unit)) = self.axes.get(event.index.unsigned_abs() as usize)
         else {
             return;
         };
         match event.kind {
             EventKind::Correct => {
                 say!(
-                    "homing {letter}: the switch is found; the axis stood {:+.6} {unit} off",
+                    "homing {name}: the switch is found; the axis stood {:+.6} {unit} off",
                     event.value / scale
                 );
             }
             EventKind::HomeByDrive => {
-                say!("homing {letter}: by its drive, within {} s", event.value);
+                say!("homing {name}: by its drive, within {} s", event.value);
             }
-            EventKind::Homed => say!("homing {letter}: goes home, to {:.6} {unit}", home / scale),
+            EventKind::Homed => say!("homing {name}: goes home, to {:.6} {unit}", home / scale),
             _ => {}
         }
     }

@@ -14,6 +14,9 @@ macro_rules! say {
 }
 
 mod args;
+mod batch;
+#[cfg(feature = "nats")]
+mod batch_nats;
 mod broken;
 mod built_in;
 #[cfg(feature = "ethercat")]
@@ -34,6 +37,7 @@ mod latency;
 mod machine;
 mod mdi;
 mod operator;
+mod piped;
 mod plugin;
 mod program;
 mod progress;
@@ -42,9 +46,11 @@ mod report;
 mod run;
 mod script;
 mod serve;
+mod session_record;
 mod state;
 mod tolerances;
 mod trace;
+mod tune;
 mod warnings;
 #[cfg(feature = "web")]
 mod web;
@@ -86,6 +92,8 @@ fn main() -> ExitCode {
         Command::Ask(options) => client::ask(&options),
         Command::Estimate(options) => estimate::estimate(&options),
         Command::Calibrate(options) => calibrate::calibrate(&options),
+        Command::Tune(options) => tune::tune(&options),
+        Command::Batch(command) => batch::batch(&command),
         Command::Identify(options) => identify::identify(&options),
         Command::Trace(command) => trace::trace(&command),
         Command::Script(command) => script::script(&command),

@@ -134,11 +134,11 @@ impl Collector {
         let (curves, chord_share) = self.curves.signals();
         self.report.signals.extend(curves);
         self.report.samples.chord_share = chord_share;
-        let (most_mm, each_mm) = self.tolerances.of_run_mm();
+        let (max_mm, each_mm) = self.tolerances.of_run_mm();
         (
             self.report.path_tolerance_mm,
             self.report.samples.tolerance_mm,
-        ) = (Some(most_mm), each_mm);
+        ) = (Some(max_mm), each_mm);
         let lost = |cause: String| RecordError::lost("report", path, cause);
         let mut out = Output::create(path).map_err(lost)?;
         self.report

@@ -1,16 +1,21 @@
 //! `tandem run`.
 
+use std::cmp::Reverse;
+use std::collections::BTreeMap;
 use std::error::Error;
 use std::fmt;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use serde::Deserialize;
 use tandem_host::{
     Clock, HostError, Left, Outcome, Run, RunObserver, StopAnswer, Switches, Timed, parse_commands,
 };
 use tandem_machine::Machine;
-use tandem_recorder::{BlocksCsv, EventsCsv, Output, PolicySummary, RecordError, Stop, Summary};
+use tandem_recorder::{
+    BlocksCsv, EventsCsv, Output, PolicySummary, RecordError, RoughCsv, Stop, Summary,
+};
 use tandem_rings::{Rest, Sample};
 use tandem_sdk::{Block, BlockReport, Curve, Event, EventKind};
 use tandem_session::HOMING;
@@ -22,25 +27,33 @@ use crate::progress::Progress;
 use crate::report::Collector;
 use crate::trace::TraceSink;
 use crate::warnings::tell_warnings;
-use crate::{FAULT, REFUSED, args, built_in, clock, hang, operator, program, refusal};
+use crate::{FAULT, REFUSED, args, built_in, clock, hang, operator, piped, program, refusal};
 
 /// Runs a program.
 pub fn run(options: &args::Run) -> Result<u8, Box<dyn Error>> {
     let machine = options.place.machine()?;
-    let program = program::open(&options.program)?;
-    let name = program.name().to_string();
     let registry = built_in::registry()?;
     let clock = clock::of(options.clock, &machine, &registry);
     let switches = switches(options, clock);
-    let run = match Run::prepare(machine.clone(), &registry, program, switches) {
-        Err(HostError::Check(report)) => {
-            program::print_errors(&report);
-            if let Some(path) = &options.report {
-                refusal::write(path, &name, &report)?;
-            }
-            return Ok(REFUSED);
+    let (run, name, follow) = if streams(options) {
+        if machine.policy.is_some() {
+            return Err("a policy script tunes programs that are checked as a whole: name a file, or /dev/stdin".into());
         }
-        other => other?,
+        let (run, follow) = piped::prepare(&machine, &registry, switches, clock == Clock::Wall)?;
+        (run, "standard input".to_string(), Some(follow))
+    } else {
+        let program = program::open(&options.program)?;
+        let name = program.name().to_string();
+        match Run::prepare(machine.clone(), &registry, program, switches) {
+            Err(HostError::Check(report)) => {
+                program::print_errors(&report);
+                if let Some(path) = &options.report {
+                    refusal::write(path, &name, &report)?;
+                }
+                return Ok(REFUSED);
+            }
+            other => (other?, name, None),
+        }
     };
     program::print_warnings(&run.checked);
     let commands = options
@@ -49,6 +62,10 @@ pub fn run(options: &args::Run) -> Result<u8, Box<dyn Error>> {
         .map_or(Ok(vec![]), |path| commands(path, clock, &machine))?;
     distinct_files(options)?;
     let mut sinks = Sinks::create(options, &machine, &name, &run, clock)?;
+    if let Some(follow) = follow {
+        // Only this one is ever set.
+        let _ = follow.set(Arc::clone(sinks.operator.hub()));
+    }
     let clock_name = if clock == Clock::Wall {
         "wall"
     } else {
@@ -64,14 +81,20 @@ pub fn run(options: &args::Run) -> Result<u8, Box<dyn Error>> {
     Ok(conclude(options, &outcome))
 }
 
-/// Whether keys are to be taken: in real time, on a terminal.
-fn keys_at_hand(clock: Clock) -> bool {
-    clock == Clock::Wall && operator::is_on_terminal()
+/// Whether lines are driven as they come, out of standard input.
+fn streams(options: &args::Run) -> bool {
+    options.program.as_os_str() == "-"
+}
+
+/// Whether keys are to be taken: in real time, on a terminal that gives no lines.
+fn keys_at_hand(options: &args::Run, clock: Clock) -> bool {
+    clock == Clock::Wall && operator::is_on_terminal() && !streams(options)
 }
 
 /// The operator's switches as the command line sets them. Where somebody can answer in real time, stops wait.
 fn switches(options: &args::Run, clock: Clock) -> Switches {
-    let attended = keys_at_hand(clock) || (clock == Clock::Wall && !options.operator.is_nowhere());
+    let attended =
+        keys_at_hand(options, clock) || (clock == Clock::Wall && !options.operator.is_nowhere());
     Switches {
         block_delete: options.block_delete,
         pause_at_stops: options.pause || (attended && !options.dry),
@@ -149,6 +172,7 @@ struct Sinks {
     progress: Progress,
     trace: Option<TraceSink>,
     blocks: Option<BlocksCsv>,
+    rough: Option<RoughCsv>,
     events: Option<EventsCsv>,
     report: Option<Collector>,
     summary: Option<Output>,
@@ -177,6 +201,10 @@ impl Sinks {
             .blocks
             .as_ref()
             .map(|path| BlocksCsv::create(path, machine));
+        let rough = options
+            .rough
+            .as_ref()
+            .map(|path| RoughCsv::create(path, machine));
         let events = options
             .events
             .as_ref()
@@ -185,7 +213,7 @@ impl Sinks {
             .report
             .as_ref()
             .map(|_| Collector::new(machine, name, &signals, run.allows_steps()));
-        let keys = keys_at_hand(clock);
+        let keys = keys_at_hand(options, clock);
         let presence = Presence {
             real_time: clock == Clock::Wall,
             pause: options.pause,
@@ -194,15 +222,20 @@ impl Sinks {
         if keys {
             Keyboard::explain();
         }
+        let mut operator = Operator::begin(&options.operator, machine, run, presence)?;
+        if streams(options) {
+            operator = operator.without_enter();
+        }
         Ok(Self {
             without_time_constants: (!run.uses_time_constants())
                 .then(|| machine.planner.plugin.clone()),
             switches: switches(options, clock),
-            operator: Operator::begin(&options.operator, machine, run, presence)?,
+            operator,
             homed: Corrections::new(machine),
             progress: Progress::new(run.checked.length_mm, machine.fine_period_s),
             trace: trace.transpose()?,
             blocks: blocks.transpose()?,
+            rough: rough.transpose()?,
             events: events.transpose()?,
             report,
             summary: options.summary.as_deref().map(summary_file).transpose()?,
@@ -216,6 +249,7 @@ impl Sinks {
         let mut broken = self.broken;
         broken.note(self.trace.map_or(Ok(()), TraceSink::finish));
         broken.note(self.blocks.map_or(Ok(()), BlocksCsv::finish));
+        broken.note(self.rough.map_or(Ok(()), RoughCsv::finish));
         let completed = summary.fault.is_none() && summary.stopped.is_none();
         broken.note(
             self.events
@@ -305,6 +339,9 @@ impl RunObserver for Sinks {
         }
         if let Some(blocks) = &mut self.blocks {
             self.broken.note(blocks.sample(sample));
+        }
+        if let Some(rough) = &mut self.rough {
+            self.broken.note(rough.sample(sample));
         }
         if let Some(events) = &mut self.events {
             self.broken.note(events.sample(sample));
@@ -436,6 +473,7 @@ pub struct Driven {
     governed_samples: u64,
     starvations: u64,
     max_path_deviation_mm: f64,
+    limited_by_s: BTreeMap<String, f64>,
 }
 
 impl Driven {
@@ -455,8 +493,31 @@ impl Driven {
             governed_samples: summary.governed_samples,
             starvations: summary.starvations,
             max_path_deviation_mm: summary.max_path_deviation_mm,
+            limited_by_s: summary.limited_by_s.clone(),
         }
     }
+}
+
+/// What the time of a motion went to, in whole percent of it, the greatest part first. Parts are rounded down but for those that
+/// lose most by it, which make up the 100; what is left with 0 % is not named. Empty where nothing took time.
+fn percent_of_time(time_s: &BTreeMap<String, f64>) -> Vec<(&str, u32)> {
+    let total_s: f64 = time_s.values().sum();
+    let mut parts: Vec<(&str, f64)> = time_s
+        .iter()
+        .map(|(name, part_s)| (name.as_str(), 100.0 * part_s / total_s))
+        .filter(|(_, percent)| percent.is_finite())
+        .collect();
+    parts.sort_by(|(_, a), (_, b)| b.fract().total_cmp(&a.fract()));
+    let whole: u32 = parts.iter().map(|(_, percent)| *percent as u32).sum();
+    let missing = 100_u32.saturating_sub(whole) as usize;
+    let mut shares: Vec<(&str, u32)> = parts
+        .iter()
+        .enumerate()
+        .map(|(place, (name, percent))| (*name, *percent as u32 + u32::from(place < missing)))
+        .filter(|(_, percent)| *percent > 0)
+        .collect();
+    shares.sort_by_key(|(name, percent)| (Reverse(*percent), *name));
+    shares
 }
 
 impl fmt::Display for Driven {
@@ -484,7 +545,15 @@ impl fmt::Display for Driven {
             self.governed_samples,
             self.starvations,
             self.max_path_deviation_mm * 1e3
-        )
+        )?;
+        let parts: Vec<String> = percent_of_time(&self.limited_by_s)
+            .iter()
+            .map(|(name, percent)| format!("{name} {percent} %"))
+            .collect();
+        if parts.is_empty() {
+            return Ok(());
+        }
+        writeln!(f, "time: {}", parts.join(", "))
     }
 }
 
@@ -531,6 +600,7 @@ fn written(options: &args::Run) -> Vec<(&'static str, &Path)> {
     let files = [
         ("trace", &options.trace),
         ("blocks", &options.blocks),
+        ("rough", &options.rough),
         ("events", &options.events),
         ("summary", &options.summary),
         ("report", &options.report),
@@ -539,4 +609,38 @@ fn written(options: &args::Run) -> Vec<(&'static str, &Path)> {
         .into_iter()
         .filter_map(|(what, path)| Some((what, path.as_deref()?)))
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn parts_of_the_time_are_whole_percent_that_sum_to_a_hundred(
+            parts_s in proptest::collection::vec((-6.0..0.0f64).prop_map(|power| 10f64.powf(power)), 1..12),
+        ) {
+            let time_s: BTreeMap<String, f64> = parts_s
+                .iter()
+                .enumerate()
+                .map(|(n, part_s)| (format!("part-{n}"), *part_s))
+                .collect();
+            let total_s: f64 = parts_s.iter().sum();
+            let parts = percent_of_time(&time_s);
+            prop_assert_eq!(parts.iter().map(|(_, percent)| percent).sum::<u32>(), 100);
+            prop_assert!(parts.is_sorted_by_key(|(_, percent)| Reverse(*percent)));
+            for (name, part_s) in &time_s {
+                let shown = parts.iter().find(|(shown, _)| shown == name);
+                let percent = shown.map_or(0.0, |(_, percent)| f64::from(*percent));
+                prop_assert!((percent - 100.0 * part_s / total_s).abs() < 1.0, "{name}: {percent}");
+            }
+        }
+    }
+
+    #[test]
+    fn parts_of_no_time_are_none() {
+        assert_eq!(percent_of_time(&BTreeMap::new()), []);
+        assert_eq!(percent_of_time(&[("rest".to_owned(), 0.0)].into()), []);
+    }
 }

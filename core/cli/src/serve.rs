@@ -2,7 +2,9 @@
 
 use std::error::Error;
 use std::io::{self, Write};
-use std::os::unix::net::UnixDatagram;
+use std::os::linux::net::SocketAddrExt as _;
+use std::os::unix::ffi::OsStrExt as _;
+use std::os::unix::net::{SocketAddr, UnixDatagram};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::thread;
@@ -13,6 +15,8 @@ use tandem_host::moves_metal;
 use tandem_machine::Machine;
 use tandem_session::controller::{Controller, Keeper, NoKeeper, Options, ScriptLine};
 use tandem_session::operator::Listen;
+#[cfg(feature = "web")]
+use tandem_session::operator::Role;
 use tandem_state::{Change, Owner, Store, default_path};
 
 use crate::{args, built_in};
@@ -36,6 +40,11 @@ pub fn serve(options: &args::Serve) -> Result<u8, Box<dyn Error>> {
     } else {
         doors(options, &machine)
     };
+    #[cfg(feature = "web")]
+    let has_page = options.http.is_some();
+    #[cfg(not(feature = "web"))]
+    let has_page = false;
+    options.operator.check_tokens(has_page)?;
     let store = store(options, &machine, replays)?;
     let lasting = store
         .as_ref()
@@ -51,6 +60,7 @@ pub fn serve(options: &args::Serve) -> Result<u8, Box<dyn Error>> {
         listen: listen.clone(),
         programs: options.programs.clone(),
         record: options.record.clone(),
+        arrivals: options.arrivals.clone(),
         enable: !options.disabled && (options.enable || simulated),
         script,
         uptime_periods: options.uptime_periods,
@@ -70,8 +80,11 @@ pub fn serve(options: &args::Serve) -> Result<u8, Box<dyn Error>> {
             enabled,
         );
         #[cfg(feature = "web")]
-        if let Some(page) = &page {
-            say!("the operator's page: {}", page.link);
+        for (link, role) in page.iter().flat_map(|page| &page.links) {
+            match role {
+                Role::SetUp => say!("the operator's page: {link}"),
+                role => say!("  who may {} alone: {link}", role.name()),
+            }
         }
         notify("READY=1");
     }
@@ -84,7 +97,6 @@ pub fn serve(options: &args::Serve) -> Result<u8, Box<dyn Error>> {
             writeln!(io::stderr(), "{line}")
         };
     })?;
-    notify("STOPPING=1");
     #[cfg(feature = "web")]
     drop(page);
     Ok(0)
@@ -156,6 +168,7 @@ fn doors(options: &args::Serve, machine: &Machine) -> Listen {
         unix: Some(unix),
         tcp: operator.listen_tcp,
         token_file: operator.token_file.clone(),
+        role_token_files: operator.role_token_files(),
         grbl_tcp: options.grbl_tcp,
         grbl_pty: options.grbl_pty.clone(),
     }
@@ -232,18 +245,23 @@ fn end_by_signals(end: impl Fn() + Send + 'static) -> Result<(), String> {
     let mut received = Signals::new(named).map_err(|e| format!("signals: {e}"))?;
     thread::spawn(move || {
         for _ in received.forever() {
+            notify("STOPPING=1");
             end();
         }
     });
     Ok(())
 }
 
-/// Tells systemd, where it has started this process (sd_notify: one datagram).
+/// Tells systemd, where it has started this process (sd_notify: one datagram, to a path or an abstract name behind @).
 fn notify(state: &str) {
-    let Some(path) = std::env::var_os("NOTIFY_SOCKET") else {
+    let Some(place) = std::env::var_os("NOTIFY_SOCKET") else {
         return;
     };
+    let address = match place.as_bytes().strip_prefix(b"@") {
+        Some(name) => SocketAddr::from_abstract_name(name),
+        None => SocketAddr::from_pathname(&place),
+    };
     // Nobody listens where it fails, and the machine does not depend on it.
-    let _ = UnixDatagram::unbound()
-        .and_then(|socket| socket.send_to(state.as_bytes(), Path::new(&path)));
+    let _ = address
+        .and_then(|address| UnixDatagram::unbound()?.send_to_addr(state.as_bytes(), &address));
 }

@@ -2,15 +2,15 @@
 
 use std::sync::Arc;
 
-use tandem_session::operator::{Listen, is_same_token, new_token, token_of_file};
-use tandem_web::{Options, Server};
+use tandem_session::operator::{Listen, Role, Tokens, new_token};
+use tandem_web::{Entry, Options, Server};
 
 use crate::args;
 
 /// The page's server, and the address that opens it.
 pub struct Page {
-    /// With the token behind #, where no server and no log sees it.
-    pub link: String,
+    /// For each token, behind # where no server and no log sees it, and what it lets do.
+    pub links: Vec<(String, Role)>,
     #[allow(dead_code, reason = "it serves while it lives")]
     server: Server,
 }
@@ -24,17 +24,29 @@ pub fn open(options: &args::Serve, listen: &Listen) -> Result<Option<Page>, Stri
         .unix
         .clone()
         .ok_or("--http serves a machine on the wall clock: a replay has nobody to show")?;
-    let token = match &options.http_token_file {
-        Some(file) => token_of_file(file)?,
-        None => new_token()?,
+    let mut tokens = match &options.http_token_file {
+        Some(file) => Tokens::of_files([(file.as_path(), Role::SetUp)])?,
+        None => Tokens::of_owner(new_token()?),
     };
-    let known = token.clone();
+    for (file, role) in options.operator.role_token_files() {
+        tokens.add(&file, role)?;
+    }
+    let links: Vec<_> = tokens.all().to_vec();
     let server = Server::start(Options {
         address,
         names: options.http_host.clone(),
-        admits: Arc::new(move |given| is_same_token(given, &known)),
+        admits: Arc::new(move |given| tokens.role_of(given).map(entry)),
         controller,
     })?;
-    let link = format!("http://{}/#token={token}", server.address);
-    Ok(Some(Page { link, server }))
+    let link = |(token, role)| (format!("http://{}/#token={token}", server.address), role);
+    let links = links.into_iter().map(link).collect();
+    Ok(Some(Page { links, server }))
+}
+
+/// A page comes through the socket of this user, and may do what its token says.
+fn entry(role: Role) -> Entry {
+    let steps_down = || format!(r#"{{"id":0,"request":"role","as":"{}"}}"#, role.name());
+    Entry {
+        opening: (role < Role::SetUp).then(steps_down),
+    }
 }

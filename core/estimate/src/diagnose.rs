@@ -18,6 +18,9 @@ pub const MAX_RMS: f64 = 0.03;
 
 /// By how much the fit may be worse with blocks of whole ticks, where the control's period is known.
 const TICK_RMS: f64 = 1e-3;
+/// Share of the residual of one acceleration for all axes that accelerations of their own have to leave, to be worth a third
+/// constant.
+const WORTH_OF_AXES: f64 = 0.8;
 const MM_PER_MIN: f64 = 60.0;
 
 /// A minimum feed measured between two long blocks.
@@ -28,7 +31,7 @@ pub struct Corner {
     /// Programmed feed, mm/s.
     pub feed_mm_per_s: f64,
     /// Minimum feed, mm/s.
-    pub least_mm_per_s: f64,
+    pub min_mm_per_s: f64,
 }
 
 /// A model fitted to measurements.
@@ -100,11 +103,18 @@ impl Fitted {
                     speed_difference_mm_per_s,
                 },
                 _,
-            ) => format!(
-                "per axis speed difference {:.3} mm/min, acceleration {:.2} mm/s²",
-                speed_difference_mm_per_s[0] * MM_PER_MIN,
-                acceleration_mm_per_s2[0]
-            ),
+            ) => {
+                let [x, y] = [acceleration_mm_per_s2[0], acceleration_mm_per_s2[1]];
+                let acceleration = if x == y {
+                    format!("{x:.2} mm/s²")
+                } else {
+                    format!("{x:.2} mm/s² along X and {y:.2} along Y")
+                };
+                format!(
+                    "per axis speed difference {:.3} mm/min, acceleration {acceleration}",
+                    speed_difference_mm_per_s[0] * MM_PER_MIN
+                )
+            }
             Choice::Regression(c) => format!(
                 "F_m = {:.3} + {:.3} d + {:.3} θ mm/min up to the feed's way in the block time",
                 c.short[0], c.short[1], c.short[2]
@@ -174,7 +184,14 @@ pub fn fit_all(timed: &[Timed], tick_s: Option<f64>) -> Vec<Fitted> {
             .unwrap_or(plain),
     ];
     all.push(Fitted::new(tangent(timed), timed));
-    all.push(Fitted::new(by_axes(timed), timed));
+    let alike = by_axes(timed);
+    let each = Fitted::new(by_each_axis(timed, &alike), timed);
+    let alike = Fitted::new(alike, timed);
+    all.push(if each.rms < WORTH_OF_AXES * alike.rms {
+        each
+    } else {
+        alike
+    });
     all
 }
 
@@ -261,6 +278,37 @@ fn by_axes(timed: &[Timed]) -> Choice {
     ))
 }
 
+/// The same with an acceleration for X and one for Y; further axes, which the polygons do not move, have the lesser. From where
+/// `alike`, with one for all, fits best.
+fn by_each_axis(timed: &[Timed], alike: &Choice) -> Choice {
+    let with = |[x, y, v]: &[f64; 3]| {
+        let mut acceleration_mm_per_s2 = [x.min(*y); MAX_AXES];
+        (acceleration_mm_per_s2[0], acceleration_mm_per_s2[1]) = (*x, *y);
+        let rule = Rule::Axis {
+            acceleration_mm_per_s2,
+            speed_difference_mm_per_s: [*v; MAX_AXES],
+        };
+        Choice::LookAhead(rule, None)
+    };
+    let (a, v) = match alike {
+        Choice::LookAhead(
+            Rule::Axis {
+                acceleration_mm_per_s2,
+                speed_difference_mm_per_s,
+            },
+            _,
+        ) => (acceleration_mm_per_s2[0], speed_difference_mm_per_s[0]),
+        _ => (800.0, 2.0),
+    };
+    let square = |p: &[f64; 3]| ratios(&with(p), timed).iter().map(|r| r * r).sum::<f64>();
+    let found = [[a / 2.0, 2.0 * a, v], [2.0 * a, a / 2.0, v]]
+        .map(|start| positive_parameters(start, |p| ratios(&with(p), timed)));
+    let best = found
+        .into_iter()
+        .min_by(|one, other| square(one).total_cmp(&square(other)));
+    with(&best.unwrap_or([a, a, v]))
+}
+
 /// The linear regression (9) with the minimum feeds of (7) and (8), and (11) where corners were measured.
 #[derive(Clone, Debug)]
 pub struct LinearFit {
@@ -324,7 +372,7 @@ fn long_form(coefficients: &mut Coefficients, corners: &[Corner]) -> Result<Good
         .collect();
     let feeds: Vec<_> = corners
         .iter()
-        .map(|c| c.least_mm_per_s * MM_PER_MIN)
+        .map(|c| c.min_mm_per_s * MM_PER_MIN)
         .collect();
     coefficients.long = least_squares(&rows, &feeds).map_err(|e| format!("equation (11): {e}"))?;
     let pair = |(c, feed): (&Corner, &f64)| {

@@ -9,6 +9,7 @@ use tandem_rings::Sample;
 use tandem_sdk::AxisVector;
 
 use crate::diagnose::Corner;
+use crate::measurements::LogRow;
 use crate::polygon::{CORNERS, FEED_MM_PER_MIN, Polygon, SIDES_MM, Timed};
 
 /// Turns of the V paths, degrees.
@@ -115,6 +116,33 @@ impl Experiment {
     /// whose feeds nobody can read by hand, are left out.
     pub fn program(&self, stops: bool) -> String {
         self.write(stops).0
+    }
+
+    /// Times of the polygons from the `log` of a control that has driven [`Experiment::program`] with stops: from when the first line
+    /// of a polygon moves to when the line behind its last one does. Host; allocates.
+    ///
+    /// # Errors
+    /// A log that misses polygons.
+    pub fn timed(&self, log: &[LogRow]) -> Result<Vec<Timed>, String> {
+        let lines = self.write(true).1;
+        let starts = |line: u32| log.iter().find(|row| row.line >= line).map(|row| row.t_s);
+        let timed = self.polygons.iter().zip(&lines).map(|(polygon, lines)| {
+            let (from, to) = (starts(lines.first)?, starts(lines.last + 1)?);
+            Some(Timed {
+                polygon: *polygon,
+                feed_mm_per_s: self.feed_mm_per_s,
+                time_s: to - from,
+            })
+        });
+        let timed: Vec<_> = timed.flatten().filter(|timed| timed.time_s > 0.0).collect();
+        if timed.len() == lines.len() {
+            return Ok(timed);
+        }
+        Err(format!(
+            "{} of {} polygons are in the log: it is to be that of the program which --program writes",
+            timed.len(),
+            lines.len()
+        ))
     }
 
     fn write(&self, stops: bool) -> (String, Vec<Lines>) {
@@ -319,7 +347,7 @@ impl Watch<'_> {
         let corner = |(vee, least): (&Vee, &f64)| Corner {
             turn_rad: vee.turn_rad,
             feed_mm_per_s: vee.feed_mm_per_s,
-            least_mm_per_s: *least,
+            min_mm_per_s: *least,
         };
         Measured {
             timed: timed.collect(),

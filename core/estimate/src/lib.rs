@@ -19,6 +19,7 @@ mod four_cases;
 mod histogram;
 mod junction;
 mod look_ahead;
+pub mod measured;
 pub mod measurements;
 mod model;
 pub mod model_file;

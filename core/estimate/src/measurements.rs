@@ -27,11 +27,93 @@ pub fn read(path: &Path) -> Result<Vec<Timed>, String> {
     parse(&name, &bytes)
 }
 
-/// Reads measurements from `bytes`; `name` is for refusals.
+/// When a line of the program moved, as a control has logged it.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+pub struct LogRow {
+    /// Time, s.
+    pub t_s: f64,
+    /// Line of the program.
+    pub line: u32,
+}
+
+/// Reads the log of a control at `path`: the columns `t_s` and `line` of a CSV file, such as a trace; others are left out, and lines
+/// that begin with #.
 ///
 /// # Errors
-/// What is no measurement, with file, line and cause.
-pub fn parse(name: &str, bytes: &[u8]) -> Result<Vec<Timed>, String> {
+/// What cannot be read, with file, line and cause; times or lines that go back.
+pub fn read_log(path: &Path) -> Result<Vec<LogRow>, String> {
+    let name = path.display().to_string();
+    let bytes = std::fs::read(path).map_err(|e| format!("{name}: {e}"))?;
+    parse_log(&name, &bytes)
+}
+
+/// Reads a log from `bytes`; `name` is for refusals.
+///
+/// # Errors
+/// What is no log, with file, line and cause.
+pub fn parse_log(name: &str, bytes: &[u8]) -> Result<Vec<LogRow>, String> {
+    let mut log: Vec<LogRow> = vec![];
+    each_row(name, bytes, |row: LogRow| {
+        if let Some(last) = log.last() {
+            if row.t_s.is_nan() || row.t_s < last.t_s {
+                return Err(format!("t_s: {} comes after {}", row.t_s, last.t_s));
+            }
+            if row.line < last.line {
+                return Err(format!("line: {} comes after {}", row.line, last.line));
+            }
+        } else if !row.t_s.is_finite() {
+            return Err(format!("t_s: {} is no time", row.t_s));
+        }
+        log.push(row);
+        Ok(())
+    })?;
+    Ok(log)
+}
+
+/// What a program took at a control.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ProgramTime {
+    /// The program, as its file is called.
+    pub program: String,
+    /// Time, s.
+    pub seconds: f64,
+    /// How far the reading may be off, s.
+    #[serde(default)]
+    pub reading_error_s: f64,
+}
+
+/// Reads what programs took from the CSV file at `path`: `program,seconds` and, where it is known, `reading_error_s`.
+///
+/// # Errors
+/// What cannot be read, with file, line and cause.
+pub fn read_programs(path: &Path) -> Result<Vec<ProgramTime>, String> {
+    let name = path.display().to_string();
+    let bytes = std::fs::read(path).map_err(|e| format!("{name}: {e}"))?;
+    let mut all = vec![];
+    each_row(&name, &bytes, |row: ProgramTime| {
+        let known = row.reading_error_s.is_finite() && row.reading_error_s >= 0.0;
+        if !(row.seconds.is_finite() && row.seconds > 0.0) {
+            return Err(format!("seconds: {} is not above zero", row.seconds));
+        }
+        if !known {
+            return Err(format!(
+                "reading_error_s: {} is below zero",
+                row.reading_error_s
+            ));
+        }
+        all.push(row);
+        Ok(())
+    })?;
+    Ok(all)
+}
+
+/// Hands each row of a CSV file to `take`; lines that begin with # are left out.
+fn each_row<T: serde::de::DeserializeOwned>(
+    name: &str,
+    bytes: &[u8],
+    mut take: impl FnMut(T) -> Result<(), String>,
+) -> Result<(), String> {
     let mut reader = csv::ReaderBuilder::new()
         .comment(Some(b'#'))
         .trim(csv::Trim::All)
@@ -40,18 +122,27 @@ pub fn parse(name: &str, bytes: &[u8]) -> Result<Vec<Timed>, String> {
         .headers()
         .map_err(|e| format!("{name}: {e}"))?
         .clone();
-    let mut all = vec![];
     for record in reader.records() {
         let record = record.map_err(|e| format!("{name}: {e}"))?;
         let line = record.position().map_or(0, csv::Position::line);
-        let row: Row = record
+        let row: T = record
             .deserialize(Some(&headers))
             .map_err(|e| format!("{name}:{line}: {}", cause(&e, &headers)))?;
-        all.push(
-            row.timed()
-                .map_err(|cause| format!("{name}:{line}: {cause}"))?,
-        );
+        take(row).map_err(|cause| format!("{name}:{line}: {cause}"))?;
     }
+    Ok(())
+}
+
+/// Reads measurements from `bytes`; `name` is for refusals.
+///
+/// # Errors
+/// What is no measurement, with file, line and cause.
+pub fn parse(name: &str, bytes: &[u8]) -> Result<Vec<Timed>, String> {
+    let mut all = vec![];
+    each_row(name, bytes, |row: Row| {
+        all.push(row.timed()?);
+        Ok(())
+    })?;
     if all.len() < 6 {
         return Err(format!(
             "{name}: {} measurements do not make a calibration; there should be 6 at least",

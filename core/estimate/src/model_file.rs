@@ -79,9 +79,32 @@ enum JunctionKind {
 #[serde(deny_unknown_fields)]
 struct LookAheadTable {
     junction: Spanned<JunctionKind>,
-    acceleration_mm_per_s2: Spanned<f64>,
+    acceleration_mm_per_s2: Spanned<Accelerations>,
     allowable_speed_difference_mm_per_min: Spanned<f64>,
     tangent_feed_mm_per_min: Option<Spanned<f64>>,
+}
+
+/// One for all axes, or one for each in the order of the machine file; axes beyond have the least of them.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Accelerations {
+    All(f64),
+    Each(Vec<f64>),
+}
+
+impl Accelerations {
+    /// As many as a machine may have axes; none where there are none or too many.
+    fn each(&self) -> Option<[f64; MAX_AXES]> {
+        match self {
+            Self::All(one) => Some([*one; MAX_AXES]),
+            Self::Each(each) if (1..=MAX_AXES).contains(&each.len()) => {
+                let least = each.iter().copied().fold(f64::INFINITY, f64::min);
+                let of = |axis: usize| each.get(axis).copied().unwrap_or(least);
+                Some(std::array::from_fn(of))
+            }
+            Self::Each(_) => None,
+        }
+    }
 }
 
 /// A text with the name that refusals give it.
@@ -290,10 +313,19 @@ fn overlap(
 
 fn look_ahead(source: &Source<'_>, table: &LookAheadTable) -> Result<Rule, ModelFileError> {
     let key = |name: &str| format!("look-ahead.{name}");
-    let a = source.positive(
-        &key("acceleration_mm_per_s2"),
-        &table.acceleration_mm_per_s2,
-    )?;
+    let stated = &table.acceleration_mm_per_s2;
+    let each = stated
+        .get_ref()
+        .each()
+        .filter(|each| each.iter().all(|a| a.is_finite() && *a > 0.0))
+        .ok_or_else(|| {
+            let cause = format!(
+                "{}: must be a number above zero, or an array of 1 to {MAX_AXES} of them, one an axis",
+                key("acceleration_mm_per_s2")
+            );
+            source.refuse(Some(stated.span()), cause)
+        })?;
+    let a = each[0];
     let name = key("allowable_speed_difference_mm_per_min");
     let v = source.positive(&name, &table.allowable_speed_difference_mm_per_min)? / MM_PER_MIN;
     let tangent = source.optional(
@@ -301,13 +333,17 @@ fn look_ahead(source: &Source<'_>, table: &LookAheadTable) -> Result<Rule, Model
         table.tangent_feed_mm_per_min.as_ref(),
     )?;
     match (*table.junction.get_ref(), tangent) {
+        (JunctionKind::Tangent, Some(_)) if each != [a; MAX_AXES] => Err(source.refuse(
+            Some(stated.span()),
+            "look-ahead.acceleration_mm_per_s2: \"tangent\" has one acceleration, along the path",
+        )),
         (JunctionKind::Tangent, Some(feed)) => Ok(Rule::Tangent {
             acceleration_mm_per_s2: Some(a),
             period_s: feed / MM_PER_MIN / a,
             speed_difference_mm_per_s: v,
         }),
         (JunctionKind::Axis, None) => {
-            Ok(Rule::Axis { acceleration_mm_per_s2: [a; MAX_AXES], speed_difference_mm_per_s: [v; MAX_AXES] })
+            Ok(Rule::Axis { acceleration_mm_per_s2: each, speed_difference_mm_per_s: [v; MAX_AXES] })
         }
         _ => Err(source.refuse(
             Some(table.junction.span()),
@@ -374,7 +410,7 @@ fn look_ahead_text(rule: &Rule) -> String {
             let a = acceleration_mm_per_s2.unwrap_or(f64::INFINITY);
             (
                 "tangent",
-                a,
+                format!("{a:?}"),
                 *v,
                 format!(
                     "tangent_feed_mm_per_min = {:?}\n",
@@ -385,13 +421,27 @@ fn look_ahead_text(rule: &Rule) -> String {
         Rule::Axis {
             acceleration_mm_per_s2: a,
             speed_difference_mm_per_s: v,
-        } => ("axis", a[0], v[0], String::new()),
+        } => ("axis", accelerations_text(a), v[0], String::new()),
     };
     format!(
-        "junction = \"{junction}\"\nacceleration_mm_per_s2 = {a:?}\n\
+        "junction = \"{junction}\"\nacceleration_mm_per_s2 = {a}\n\
          allowable_speed_difference_mm_per_min = {:?}\n{tangent}",
         v * MM_PER_MIN
     )
+}
+
+/// One number where all are alike, else an array without what follows from it.
+fn accelerations_text(all: &[f64; MAX_AXES]) -> String {
+    let least = all.iter().copied().fold(f64::INFINITY, f64::min);
+    let mut count = MAX_AXES;
+    while count > 1 && all[count - 1] == least && all[..count - 1].contains(&least) {
+        count -= 1;
+    }
+    if count == 1 {
+        format!("{:?}", all[0])
+    } else {
+        format!("{:?}", &all[..count])
+    }
 }
 
 #[cfg(test)]
@@ -415,8 +465,15 @@ mod tests {
             ramp_s: Some(0.03),
             ..Coefficients::default()
         };
+        let mut unequal = [300.0; MAX_AXES];
+        unequal[1] = 900.0;
+        let unequal = Rule::Axis {
+            acceleration_mm_per_s2: unequal,
+            speed_difference_mm_per_s: [2.0; MAX_AXES],
+        };
         let all = [
             Choice::LookAhead(axis, Some(5000.0)),
+            Choice::LookAhead(unequal, None),
             Choice::Overlap(constants),
             Choice::Regression(moving),
             Choice::Regression(Coefficients::default()),
@@ -448,6 +505,25 @@ mod tests {
         assert!(
             said("format = 1\nmodel = \"look\"\n")
                 .starts_with("m.toml:2:9: unknown variant `look`")
+        );
+        let look_ahead = |junction: &str, a: &str| {
+            said(&format!(
+                "format = 1\nmodel = \"look-ahead\"\n[look-ahead]\n{junction}\nacceleration_mm_per_s2 = {a}\n\
+                 allowable_speed_difference_mm_per_min = 1.0\n"
+            ))
+        };
+        for wrong in ["[]", "[300.0, -1.0]", "0.0"] {
+            let said = look_ahead("junction = \"axis\"", wrong);
+            assert!(
+                said.starts_with("m.toml:5:26: look-ahead.acceleration_mm_per_s2: must be"),
+                "{said}"
+            );
+        }
+        let tangent = "junction = \"tangent\"\ntangent_feed_mm_per_min = 5.0";
+        let said_of_tangent = look_ahead(tangent, "[300.0, 900.0]");
+        assert!(
+            said_of_tangent.contains("has one acceleration, along the path"),
+            "{said_of_tangent}"
         );
         let other = said(&format!(
             "{head}[look-ahead]\njunction = \"axis\"\nacceleration_mm_per_s2 = 1.0\n\

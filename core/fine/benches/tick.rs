@@ -4,50 +4,15 @@ use std::sync::atomic::Ordering::Relaxed;
 
 use divan::counter::ItemsCount;
 use tandem_fine::{FineConfig, FineLoop, GuardMode};
+use tandem_rig::Echo;
 use tandem_rings::{HostEnd, MachineState, Queued, RoughEnd, Sizes, bridge};
-use tandem_sdk::{
-    Attached, AxisLimits, AxisVector, Driver, DriverContext, DriverDescription, Feedback,
-    JointState, Limits, PluginError, Segment, SegmentFlags, Setpoint,
-};
+use tandem_sdk::{AxisLimits, AxisVector, Limits, Segment, SegmentFlags};
 
 const TICKS: usize = 1000;
 const FEED_MM_PER_S: f64 = 50.0;
 
 fn main() {
     divan::main();
-}
-
-/// Drives that are where they are told to be.
-struct Echo;
-
-impl Driver for Echo {
-    fn describe(&self) -> DriverDescription {
-        DriverDescription::simulated()
-    }
-    fn open(&mut self, _context: &DriverContext) -> Result<(), PluginError> {
-        Ok(())
-    }
-    fn start(&mut self) -> Result<Attached, PluginError> {
-        Ok(Attached::default())
-    }
-    fn exchange(
-        &mut self,
-        setpoint: &Setpoint,
-        feedback: &mut Feedback,
-    ) -> Result<(), PluginError> {
-        (feedback.position, feedback.speed) = (setpoint.position, setpoint.velocity);
-        let enabled = if setpoint.enable == 0 {
-            JointState::Disabled
-        } else {
-            JointState::Enabled
-        };
-        feedback.state = [enabled; 8];
-        Ok(())
-    }
-    fn quick_stop(&mut self) {}
-    fn stop(&mut self) -> Result<(), PluginError> {
-        Ok(())
-    }
 }
 
 /// A fine loop with a queue that lasts for [`TICKS`] ticks and a few more.
@@ -77,7 +42,7 @@ impl Bench {
         rough.depth.wall_s.store(f64::INFINITY);
         rough.depth.required_s.store(0.0);
         let mut this = Self {
-            fine: FineLoop::new(&config(order), end, Box::new(Echo), None),
+            fine: FineLoop::new(&config(order), end, Box::new(Echo::default()), None),
             host,
             _rough: rough,
         };

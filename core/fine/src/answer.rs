@@ -173,14 +173,14 @@ pub fn reported(feedback: &Feedback, joints: usize, moving: bool, own: u32) -> O
     faulty.or_else(lost).or_else(let_go)
 }
 
-/// The fault that a joint which follows is further from where it was told to be than its limit in `most_mm` allows: what is
+/// The fault that a joint which follows is further from where it was told to be than its limit in `max_mm` allows: what is
 /// reported answers what was `sent` its `delay_periods` before the last. What is old is not judged, nor is a joint that is its
 /// drive's `own`, a bit each. Fine loop.
 pub fn following(
     feedback: &Feedback,
     (sent, delay_periods): (&History, &[u32; MAX_AXES]),
     joints: usize,
-    most_mm: &AxisVector,
+    max_mm: &AxisVector,
     own: u32,
 ) -> Option<FaultKind> {
     let error =
@@ -189,14 +189,14 @@ pub fn following(
         feedback.state[joint] == JointState::Enabled && feedback.age_periods[joint] == 0
     };
     let judged =
-        |joint: &usize| most_mm[*joint] < f64::INFINITY && own >> *joint & 1 == 0 && holds(*joint);
+        |joint: &usize| max_mm[*joint] < f64::INFINITY && own >> *joint & 1 == 0 && holds(*joint);
     let lost = (0..joints)
         .filter(judged)
-        .find(|joint| error(*joint) > most_mm[*joint]);
+        .find(|joint| error(*joint) > max_mm[*joint]);
     lost.map(|joint| FaultKind::Following {
         joint,
         error_mm: error(joint),
-        limit_mm: most_mm[joint],
+        limit_mm: max_mm[joint],
     })
 }
 
@@ -273,7 +273,7 @@ mod tests {
             state: [JointState::Enabled; 8],
             ..Feedback::default()
         };
-        let most_mm = AxisVector([f64::INFINITY, 0.5, 0.25, 0.25, 0.1, 0.1, 0.1, 0.1]);
+        let max_mm = AxisVector([f64::INFINITY, 0.5, 0.25, 0.25, 0.1, 0.1, 0.1, 0.1]);
         let mut sent = History::new(&AxisVector([7.0; 8]));
         sent.push(&AxisVector([0.5; 8]));
         let command = (&sent, &[0; MAX_AXES]);
@@ -283,12 +283,12 @@ mod tests {
             limit_mm: 0.25,
         });
         assert_eq!(
-            following(&feedback, command, 3, &most_mm, 0),
+            following(&feedback, command, 3, &max_mm, 0),
             fault,
             "at the limit it is not beyond it"
         );
         assert_eq!(
-            following(&feedback, command, 3, &most_mm, 1 << 2),
+            following(&feedback, command, 3, &max_mm, 1 << 2),
             None,
             "its drive has it"
         );
@@ -298,19 +298,13 @@ mod tests {
             limit_mm: 0.5,
         });
         assert_eq!(
-            following(
-                &feedback,
-                (&sent, &[0, 1, 0, 0, 0, 0, 0, 0]),
-                3,
-                &most_mm,
-                0
-            ),
+            following(&feedback, (&sent, &[0, 1, 0, 0, 0, 0, 0, 0]), 3, &max_mm, 0),
             before,
             "a period ago"
         );
         feedback.state[2] = JointState::Disabled;
         assert_eq!(
-            following(&feedback, command, 3, &most_mm, 0),
+            following(&feedback, command, 3, &max_mm, 0),
             None,
             "what is off follows nothing"
         );

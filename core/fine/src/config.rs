@@ -48,6 +48,23 @@ impl Default for MissedLimits {
     }
 }
 
+/// A home switch.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct HomeSwitch {
+    /// Its digital input, 0 to 63.
+    pub input: u32,
+    /// The input is 0 on the switch.
+    pub inverted: bool,
+}
+
+impl HomeSwitch {
+    /// Whether it is on, where the inputs are `inputs`.
+    #[inline]
+    pub fn is_on(&self, inputs: u64) -> bool {
+        (inputs >> self.input.min(63) & 1 == 1) != self.inverted
+    }
+}
+
 /// Everything the fine loop is told before it runs.
 #[derive(Clone, Copy, Debug)]
 #[allow(clippy::struct_excessive_bools)] // independent facts of the machine and the run
@@ -70,6 +87,10 @@ pub struct FineConfig {
     pub position: AxisVector,
     /// Highest feed ratio that can be asked: the planner plans at it.
     pub max_feed_ratio: f64,
+    /// Fine periods over which a ratio of strategy or policy is led over to the next: those of a rough period.
+    pub ratio_periods: u32,
+    /// The ratios of the strategy count an operator's feed override above 1 already.
+    pub strategy_takes_override: bool,
     /// Largest distance between the command and the feedback of a period, per joint, mm or rad; infinite for none.
     pub max_following_error_mm: AxisVector,
     /// Which missed periods are a fault.
@@ -85,6 +106,8 @@ pub struct FineConfig {
     pub unhomed: u32,
     /// Bit per joint whose drive keeps to a torque limit while its axis is not homed.
     pub homing_limits: u32,
+    /// The home switch of each axis, for motion that waits for those of several ([`tandem_sdk::StopOn::home_switches`]).
+    pub home_switches: [HomeSwitch; MAX_AXES],
     /// Samples are published from the start, and in the coordinates of the drives: a record of homing itself.
     pub record_drives: bool,
     /// Where the joints stand, as the driver has told.
@@ -118,6 +141,8 @@ impl FineConfig {
             guard: GuardMode::Stop,
             position: AxisVector::ZERO,
             max_feed_ratio: 1.0,
+            ratio_periods: 1,
+            strategy_takes_override: false,
             max_following_error_mm: AxisVector([f64::INFINITY; MAX_AXES]),
             missed: MissedLimits::default(),
             kept_outputs: 0,
@@ -125,6 +150,7 @@ impl FineConfig {
             dry_run: false,
             unhomed: 0,
             homing_limits: 0,
+            home_switches: [HomeSwitch::default(); MAX_AXES],
             record_drives: false,
             attached: Attached::default(),
             enable_periods: 5000,

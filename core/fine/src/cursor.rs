@@ -8,7 +8,7 @@ use rtrb::Consumer;
 use tandem_rings::Queued;
 use tandem_sdk::{AxisVector, Segment, SegmentFlags};
 
-use crate::points::Points;
+use crate::period_points::PeriodPoints;
 use crate::steps::{Recent, Steps};
 
 /// What a move lacks to the end of a segment, as a share of its time, that is rounding: the move reaches the end, and owes it. A
@@ -108,7 +108,7 @@ impl Cursor {
     }
 
     /// Rests at `position` from here on, in the next epoch: older entries no longer count.
-    pub fn part(&mut self, position: &AxisVector) {
+    pub fn end_epoch(&mut self, position: &AxisVector) {
         let mut rest = Segment::rest(position, 0.0);
         (rest.block, rest.line, rest.feed_mm_per_s) = (
             self.segment.block,
@@ -123,7 +123,7 @@ impl Cursor {
         self.look_at_path();
     }
 
-    /// Behind every move: where the place is on the path.
+    /// After every move: where the place is on the path.
     fn look_at_path(&mut self) {
         self.path_mm = self.segment.path_mm(self.local_s);
         self.path_speed_mm_per_s = if self.resting {
@@ -162,7 +162,7 @@ impl Cursor {
     }
 
     /// Collects where the plan goes within `horizon_s` from here, without moving.
-    pub fn scan(&mut self, horizon_s: f64, points: &mut Points) {
+    pub fn scan(&mut self, horizon_s: f64, points: &mut PeriodPoints) {
         points.clear();
         let mut left_s = horizon_s;
         if !self.resting {
@@ -173,7 +173,7 @@ impl Cursor {
                 return;
             }
         }
-        let waiting = self.entries.slots().min(Points::SEGMENTS);
+        let waiting = self.entries.slots().min(PeriodPoints::SEGMENTS);
         let Ok(chunk) = self.entries.read_chunk(waiting) else {
             return;
         };
@@ -200,17 +200,17 @@ impl Cursor {
     }
 
     /// Path speed planned `ahead_s` from here, without moving, with the programmed feed and whether it is a rapid.
-    pub fn ahead(&mut self, ahead_s: f64) -> Ahead {
+    pub fn planned_after(&mut self, ahead_s: f64) -> PlannedSpeed {
         let mut left_s = ahead_s;
         if !self.resting {
             let here_s = self.segment.duration_s - self.local_s;
             if left_s < here_s || ends(&self.segment) {
-                return Ahead::at(&self.segment, self.local_s + left_s.min(here_s));
+                return PlannedSpeed::at(&self.segment, self.local_s + left_s.min(here_s));
             }
             left_s -= here_s;
         }
-        let waiting = self.entries.slots().min(Points::SEGMENTS);
-        let mut last = Ahead::at(&self.segment, self.segment.duration_s);
+        let waiting = self.entries.slots().min(PeriodPoints::SEGMENTS);
+        let mut last = PlannedSpeed::at(&self.segment, self.segment.duration_s);
         let mut most = if self.resting {
             0.0
         } else {
@@ -225,9 +225,9 @@ impl Cursor {
                 continue;
             };
             most = segment.feed_mm_per_s.max(most);
-            last = Ahead {
-                most_feed_mm_per_s: most,
-                ..Ahead::at(segment, left_s.min(segment.duration_s))
+            last = PlannedSpeed {
+                max_feed_mm_per_s: most,
+                ..PlannedSpeed::at(segment, left_s.min(segment.duration_s))
             };
             if left_s < segment.duration_s || ends(segment) {
                 return last;
@@ -339,7 +339,7 @@ fn ends(segment: &Segment) -> bool {
 
 /// The plan a little ahead.
 #[derive(Clone, Copy, Debug)]
-pub struct Ahead {
+pub struct PlannedSpeed {
     /// Planned path speed, mm/s.
     pub speed_mm_per_s: f64,
     /// Path coordinate, mm.
@@ -347,18 +347,18 @@ pub struct Ahead {
     /// Programmed feed, mm/s.
     pub feed_mm_per_s: f64,
     /// Highest programmed feed on the way there, mm/s.
-    pub most_feed_mm_per_s: f64,
+    pub max_feed_mm_per_s: f64,
     /// Rapid motion.
     pub rapid: bool,
 }
 
-impl Ahead {
+impl PlannedSpeed {
     fn at(segment: &Segment, local_s: f64) -> Self {
         Self {
             speed_mm_per_s: segment.path_speed_mm_per_s(local_s),
             path_mm: segment.path_mm(local_s),
             feed_mm_per_s: segment.feed_mm_per_s,
-            most_feed_mm_per_s: segment.feed_mm_per_s,
+            max_feed_mm_per_s: segment.feed_mm_per_s,
             rapid: segment.flags.contains(SegmentFlags::RAPID),
         }
     }
@@ -400,7 +400,7 @@ mod tests {
             jerk_mm_per_s3: f64::INFINITY,
             speed_difference_mm_per_s: 0.0,
         };
-        let mut points = Points::new(&[axis; MAX_AXES], 1);
+        let mut points = PeriodPoints::new(&[axis; MAX_AXES], 1);
         (1..=most).find(|_| {
             cursor.scan(rate * period_s, &mut points);
             let covered_s = if cursor.is_resting() {

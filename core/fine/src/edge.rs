@@ -1,7 +1,8 @@
 //! The input edge that ends a motion: probing, homing.
 
-use tandem_sdk::{Arm, AxisVector, Edge, Feedback, Latch, MAX_LATCHES, Segment, StopOn};
+use tandem_sdk::{Arm, AxisVector, Edge, Feedback, Latch, MAX_AXES, MAX_LATCHES, Segment, StopOn};
 
+use crate::config::HomeSwitch;
 use crate::history::History;
 
 /// Watches for the edge while a block that waits for one moves.
@@ -15,13 +16,18 @@ pub struct EdgeWatch {
 impl EdgeWatch {
     /// Begins to watch where `segment` is the first of its block; `before` is the feedback before it moved. Whether the
     /// input already has the level waited for. Fine loop.
-    pub fn begin(&mut self, segment: &Segment, before: &Feedback) -> bool {
+    pub fn begin(
+        &mut self,
+        segment: &Segment,
+        before: &Feedback,
+        homes: &[HomeSwitch; MAX_AXES],
+    ) -> bool {
         if segment.stop_on.edge == Edge::None || self.block == Some(segment.block) {
             return false;
         }
         self.block = Some(segment.block);
         self.latches = before.latches;
-        has_level(&segment.stop_on, before.inputs)
+        has_level(&segment.stop_on, before, homes)
     }
 
     /// Joint positions at the edge that `stop_on` waits for, mm or rad, where it has come. A latch of the drives is
@@ -34,6 +40,7 @@ impl EdgeWatch {
         feedback: &Feedback,
         measured: &History,
         period_s: f64,
+        homes: &[HomeSwitch; MAX_AXES],
     ) -> Option<AxisVector> {
         let fits =
             |latch: &Latch| latch.input == stop_on.input && latch.edge == stop_on.edge as u32;
@@ -52,8 +59,8 @@ impl EdgeWatch {
                 }
             })));
         }
-        let is_new = feedback.input_age_periods[stop_on.input.min(63) as usize] == 0;
-        (is_new && has_level(stop_on, feedback.inputs)).then_some(feedback.position)
+        (is_new(stop_on, feedback) && has_level(stop_on, feedback, homes))
+            .then_some(feedback.position)
     }
 
     /// Forgets the block. Fine loop.
@@ -66,6 +73,7 @@ impl EdgeWatch {
 pub fn arm_for(stop_on: &StopOn) -> Arm {
     match stop_on.edge {
         Edge::None => Arm::default(),
+        _ if stop_on.home_axes().is_some() => Arm::default(),
         edge => Arm {
             input: stop_on.input,
             edge: edge as u32,
@@ -73,8 +81,16 @@ pub fn arm_for(stop_on: &StopOn) -> Arm {
     }
 }
 
-fn has_level(stop_on: &StopOn, inputs: u64) -> bool {
-    let high = inputs >> stop_on.input.min(63) & 1 == 1;
+/// Whether the input that is waited for was read in this period; each of several is asked by itself.
+fn is_new(stop_on: &StopOn, feedback: &Feedback) -> bool {
+    stop_on.home_axes().is_some() || feedback.input_age_periods[stop_on.input.min(63) as usize] == 0
+}
+
+fn has_level(stop_on: &StopOn, feedback: &Feedback, homes: &[HomeSwitch; MAX_AXES]) -> bool {
+    if let Some(axes) = stop_on.home_axes() {
+        return stop_on.edge != Edge::None && any_home(axes, stop_on.edge, feedback, homes);
+    }
+    let high = feedback.inputs >> stop_on.input.min(63) & 1 == 1;
     match stop_on.edge {
         Edge::None => false,
         Edge::Rising => high,
@@ -82,9 +98,69 @@ fn has_level(stop_on: &StopOn, inputs: u64) -> bool {
     }
 }
 
+/// Whether a home switch of `axes` is on (rising), or off.
+#[inline(never)]
+fn any_home(axes: u32, edge: Edge, feedback: &Feedback, homes: &[HomeSwitch; MAX_AXES]) -> bool {
+    let wanted = edge == Edge::Rising;
+    homes.iter().enumerate().any(|(axis, home)| {
+        axes >> axis & 1 == 1
+            && feedback.input_age_periods[home.input.min(63) as usize] == 0
+            && home.is_on(feedback.inputs) == wanted
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The switches of the first two axes; the second is 0 where it is on.
+    const HOMES: [HomeSwitch; MAX_AXES] = {
+        let mut homes = [HomeSwitch {
+            input: 9,
+            inverted: false,
+        }; MAX_AXES];
+        homes[1] = HomeSwitch {
+            input: 12,
+            inverted: true,
+        };
+        homes
+    };
+
+    #[test]
+    fn any_home_switch_of_the_axes_that_move_ends_their_motion_and_no_other() {
+        let waits = |axes, edge| {
+            let mut segment = probing(edge);
+            segment.stop_on = StopOn::home_switches(axes, edge);
+            segment
+        };
+        let found = |axes, edge, inputs| {
+            find(&EdgeWatch::default(), &waits(axes, edge), &feedback(inputs)).is_some()
+        };
+        let (first, second) = (1 << 9, 1 << 12);
+        // The second is on where its input is 0.
+        for (axes, inputs, trips, releases) in [
+            (1, second, false, true),
+            (1, first, true, false),
+            (2, second, false, true),
+            (2, 0, true, false),
+            (3, second, false, true),
+            (3, first | second, true, true),
+            (3, first, true, false),
+        ] {
+            assert_eq!(
+                (
+                    found(axes, Edge::Rising, inputs),
+                    found(axes, Edge::Falling, inputs)
+                ),
+                (trips, releases),
+                "axes {axes:b}, inputs {inputs:b}"
+            );
+        }
+        let mut old = feedback(first);
+        old.input_age_periods[9] = 1;
+        assert!(find(&EdgeWatch::default(), &waits(1, Edge::Rising), &old).is_none());
+        assert_eq!(arm_for(&waits(3, Edge::Rising).stop_on), Arm::default());
+    }
 
     fn probing(edge: Edge) -> Segment {
         let mut segment = Segment::rest(&AxisVector::ZERO, 1.0);
@@ -113,7 +189,7 @@ mod tests {
         for at in 1..=5 {
             measured.push(&AxisVector([f64::from(at); 8]));
         }
-        watch.find(&segment.stop_on, feedback, &measured, 0.001)
+        watch.find(&segment.stop_on, feedback, &measured, 0.001, &HOMES)
     }
 
     #[test]
@@ -145,20 +221,20 @@ mod tests {
     fn a_level_that_is_there_before_the_motion_is_told_once() {
         for (edge, there, away) in [(Edge::Rising, 8, 0), (Edge::Falling, 0, 8)] {
             let mut watch = EdgeWatch::default();
-            assert!(watch.begin(&probing(edge), &feedback(there)));
+            assert!(watch.begin(&probing(edge), &feedback(there), &HOMES));
             assert!(
-                !watch.begin(&probing(edge), &feedback(there)),
+                !watch.begin(&probing(edge), &feedback(there), &HOMES),
                 "it moves already"
             );
             watch.end();
-            assert!(!watch.begin(&probing(edge), &feedback(away)));
+            assert!(!watch.begin(&probing(edge), &feedback(away), &HOMES));
             assert_eq!(find(&watch, &probing(edge), &feedback(away)), None);
             assert_eq!(
                 find(&watch, &probing(edge), &feedback(there)),
                 Some(AxisVector([5.0; 8]))
             );
         }
-        assert!(!EdgeWatch::default().begin(&probing(Edge::None), &feedback(u64::MAX)));
+        assert!(!EdgeWatch::default().begin(&probing(Edge::None), &feedback(u64::MAX), &HOMES));
     }
 
     #[test]
@@ -176,7 +252,7 @@ mod tests {
             feedback
         };
         let mut watch = EdgeWatch::default();
-        watch.begin(&segment, &with(3, 1, 1.0));
+        watch.begin(&segment, &with(3, 1, 1.0), &HOMES);
         assert_eq!(
             find(&watch, &segment, &with(3, 1, 1.0)),
             None,

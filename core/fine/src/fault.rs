@@ -27,7 +27,7 @@ pub enum InputFault {
     /// It is the end of an axis' way, and something moves.
     Limit,
     /// The motion waits for it and does not hear of it.
-    Awaited,
+    NotHeardOf,
 }
 
 /// The cause of a fault.

@@ -51,7 +51,7 @@ pub struct Along {
     /// Path acceleration, mm/s².
     pub acceleration_mm_per_s2: f64,
     /// Deceleration that may be used, mm/s².
-    pub most_mm_per_s2: f64,
+    pub max_mm_per_s2: f64,
     /// Jerk that may be used, mm/s³; infinite where it is not limited.
     pub jerk_mm_per_s3: f64,
 }
@@ -67,7 +67,7 @@ impl Along {
     /// below the `(n − 1)·s` that take n periods. The next period finds n − 1 and u − s: braking is even, the end speed is
     /// met and not gone below, and rest is met at the place itself.
     pub fn speed_towards(&self, left_mm: f64, end_mm_per_s: f64, period_s: f64) -> f64 {
-        let step = self.most_mm_per_s2 * period_s;
+        let step = self.max_mm_per_s2 * period_s;
         let way = left_mm / period_s - f64::midpoint(self.speed_mm_per_s, end_mm_per_s);
         if step.is_infinite() {
             // Nothing that is queued moves.
@@ -92,7 +92,7 @@ impl Along {
 
     /// Way until the speed has come down to `end_mm_per_s`, mm: acceleration to zero, deceleration up, held, and down.
     pub fn way_to_mm(&self, end_mm_per_s: f64) -> f64 {
-        let (a, j) = (self.most_mm_per_s2, self.jerk_mm_per_s3);
+        let (a, j) = (self.max_mm_per_s2, self.jerk_mm_per_s3);
         let (mut v, mut way_mm) = (self.speed_mm_per_s, 0.0);
         let mut braking = -self.acceleration_mm_per_s2;
         if braking < 0.0 {
@@ -126,11 +126,11 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn along(speed_mm_per_s: f64, most_mm_per_s2: f64) -> Along {
+    fn along(speed_mm_per_s: f64, max_mm_per_s2: f64) -> Along {
         Along {
             speed_mm_per_s,
             acceleration_mm_per_s2: 0.0,
-            most_mm_per_s2,
+            max_mm_per_s2,
             jerk_mm_per_s3: f64::INFINITY,
         }
     }

@@ -5,25 +5,25 @@
 
 mod answer;
 mod config;
-mod course;
 mod cursor;
 mod edge;
 mod fault;
 mod governor;
 mod guard;
 mod history;
+mod horizon;
 mod law;
-mod outlook;
 mod outputs;
-mod points;
-mod preview;
+mod period_points;
+mod plan_ahead;
 mod ramp;
 mod roles;
+mod slowdowns;
 mod state;
 mod steps;
 mod tick;
 
-pub use config::{FineConfig, GuardMode, Joints, MissedLimits};
+pub use config::{FineConfig, GuardMode, HomeSwitch, Joints, MissedLimits};
 pub use fault::{Breach, Fault, FaultKind, InputFault};
 pub use roles::Roles;
-pub use tick::{Counters, FineLoop, JobEnd, Left};
+pub use tick::{FineLoop, JobEnd, Left};

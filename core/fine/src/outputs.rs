@@ -30,7 +30,7 @@ pub struct Outputs {
     pub ended: bool,
     /// The program asks to wait for the operator.
     pub stop_requested: bool,
-    /// Axes are to be called otherwise: what is added to their coordinates, mm or rad.
+    /// Axes whose position is set anew: what is added to their coordinates, mm or rad.
     pub correction: Option<AxisVector>,
     /// Joint that is to be handed over to its drive for homing, and the time that it has for it, s.
     pub hand_over: Option<(usize, f64)>,

@@ -16,7 +16,7 @@ pub struct Roles {
     /// A fault in motion.
     pub limit: u64,
     /// Home switches and probes: a fault where the motion that waits for one does not hear of it.
-    pub awaited: u64,
+    pub home_or_probe: u64,
     /// Switches that homing goes onto and off again: one that is a limit too is none while axes are homed.
     pub home_switches: u64,
     /// Those among them that are 1 as long as nothing trips them.
@@ -36,7 +36,7 @@ impl Default for Roles {
             door: 0,
             feed_hold: 0,
             limit: 0,
-            awaited: 0,
+            home_or_probe: 0,
             home_switches: 0,
             normally_closed: 0,
             max_age_periods: [0; MAX_DIGITAL],
@@ -79,7 +79,7 @@ impl Roles {
             | self.door
             | self.feed_hold
             | self.limit
-            | self.awaited
+            | self.home_or_probe
     }
 
     /// What of them is tripped by `feedback`. Fine loop; as many steps as there are inputs with a role.
@@ -156,7 +156,7 @@ mod tests {
             |roles| &mut roles.door,
             |roles| &mut roles.feed_hold,
             |roles| &mut roles.limit,
-            |roles| &mut roles.awaited,
+            |roles| &mut roles.home_or_probe,
         ];
         assert!(!Roles::default().any());
         for (number, field) in fields.iter().enumerate() {

@@ -7,7 +7,7 @@ use tandem_sdk::{MAX_AXES, Segment};
 
 /// Share of its step by which acceleration is in the worst third difference of four samples, times the period.
 const WORST: f64 = 0.75;
-/// Periods behind the one with the step whose samples show it, and as many before it in which what is begun lasts.
+/// Periods after the one with the step whose samples show it, and as many before it in which what is begun lasts.
 pub const AROUND: u8 = 2;
 
 /// Steps per axis, summed up.

@@ -10,6 +10,8 @@ mod keep_alive;
 mod missed;
 mod pieces;
 mod progress;
+mod queue;
+mod ratio;
 mod release;
 mod request;
 mod rest;
@@ -23,10 +25,12 @@ use std::sync::atomic::Ordering::Relaxed;
 
 use rtrb::{Consumer, Producer};
 use tandem_rings::{
-    Controls, Depth, FineEnd, MachineState, OperatorInputs, Ratio, Rest, Sample, Status, StopCause,
-    StrategyRequest, Switched, SwitchedBy,
+    Controls, Counters, Depth, FineEnd, MachineState, OperatorInputs, Rest, Sample, Status,
+    StopCause, StrategyRequest, Switched, SwitchedBy,
 };
-use tandem_sdk::{Arm, AxisVector, Driver, Feedback, Kinematics, PluginError, Setpoint};
+use tandem_sdk::{
+    Arm, AxisVector, Driver, Feedback, JointState, Kinematics, PluginError, Setpoint,
+};
 
 use crate::config::FineConfig;
 use crate::cursor::Cursor;
@@ -35,11 +39,11 @@ use crate::fault::{Fault, FaultKind};
 use crate::governor::Governor;
 use crate::guard::Guard;
 use crate::history::History;
-use crate::outlook::Outlook;
+use crate::horizon::Horizon;
 use crate::outputs::Outputs;
-use crate::points::Points;
-use crate::preview::{LineEnd, Preview};
+use crate::period_points::PeriodPoints;
 use crate::ramp::Ramp;
+use crate::slowdowns::{LineEnd, Slowdowns};
 use crate::state::{self, Input};
 use attach::Attach;
 use hand_over::HandOver;
@@ -47,38 +51,13 @@ use joints::Lead;
 use keep_alive::KeepAlive;
 use missed::Missed;
 use progress::Progress;
+use queue::QueueWatch;
+use ratio::StrategyRatio;
 use release::Release;
 use rest::Stop;
 use roles::RoleWatch;
 use spindle::SpinUp;
 pub use succeed::JobEnd;
-
-/// What the fine loop counted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Counters {
-    /// Samples handed out.
-    pub samples: u64,
-    /// Samples the guard stopped: 0 or 1.
-    pub guard_stops: u64,
-    /// Samples beyond a limit that were sent all the same: `guard.mode = "count"`, or a relaxed jerk.
-    pub limit_violations: u64,
-    /// Samples with σ < 1 though nothing asked for it.
-    pub governed_samples: u64,
-    /// How often the queue ran low.
-    pub starvations: u64,
-    /// Samples with σ < 1 because the ring holds too little program time, or comes by in too many pieces, for more.
-    pub queue_limited_samples: u64,
-    /// Ratios that came after the tick they were meant for.
-    pub late_ratios: u64,
-    /// Fine periods that passed without a sample.
-    pub missed_periods: u64,
-    /// Those among them in which the machine moved.
-    pub missed_in_motion: u64,
-    /// Samples beyond the jerk limit, within velocity and acceleration: no rate was known that keeps it.
-    pub jerk_relaxed_samples: u64,
-    /// Fine periods in which what is known of some joint was old: a frame was lost or late.
-    pub old_feedback_periods: u64,
-}
 
 /// What the drives were sent beside the axes when that last changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -99,8 +78,8 @@ enum Phase {
     /// Nothing has moved yet: the drives are enabled, and the queue fills.
     Waiting,
     Following,
-    /// At the rest that ended an epoch: the next one is waited for.
-    Parted,
+    /// At the rest that ended an epoch: the rough loop plans the next one from there.
+    AwaitingReplan,
     /// At rest: a drive homes its joint.
     HandedOver(HandOver),
     Ramping(Ramp),
@@ -120,15 +99,13 @@ pub struct FineLoop {
     status: Arc<Status>,
     depth: Arc<Depth>,
     samples: Producer<Sample>,
-    ratios: Consumer<Ratio>,
     requests: Consumer<StrategyRequest>,
     rests: Producer<Rest>,
-    next_ratio: Option<Ratio>,
-    ratio: f64,
+    ratio: StrategyRatio,
     cursor: Cursor,
-    points: Points,
-    outlook: Outlook,
-    preview: Preview,
+    points: PeriodPoints,
+    horizon: Horizon,
+    slowdowns: Slowdowns,
     line_end: LineEnd,
     /// Something has moved since the last hold between two lines.
     line_moves: bool,
@@ -150,10 +127,7 @@ pub struct FineLoop {
     beats_on: bool,
     phase: Phase,
     state: MachineState,
-    starved: bool,
-    /// The rough loop's looks after the ring when it was last looked at, and periods since it changed.
-    served: u32,
-    unserved: u32,
+    queue: QueueWatch,
     recovering: bool,
     tick: u64,
     attach: Attach,
@@ -200,15 +174,13 @@ impl FineLoop {
             status: end.status,
             depth: end.depth,
             samples: end.samples,
-            ratios: end.ratios,
             requests: end.requests,
             rests: end.rests,
-            next_ratio: None,
-            ratio: 1.0,
+            ratio: StrategyRatio::new(end.ratios, config.ratio_periods),
             cursor: Cursor::new(end.segments, &config.position),
-            points: Points::new(limits, lanes),
-            outlook: Outlook::new(limits, lanes, config.period_s),
-            preview: Preview::new(),
+            points: PeriodPoints::new(limits, lanes),
+            horizon: Horizon::new(limits, lanes, config.period_s),
+            slowdowns: Slowdowns::new(),
             line_end: LineEnd::default(),
             line_moves: false,
             governor: Governor::new(limits, lanes, config.period_s),
@@ -226,9 +198,7 @@ impl FineLoop {
             beats_on: false,
             phase: Phase::Waiting,
             state: MachineState::Fault,
-            starved: false,
-            served: 0,
-            unserved: 0,
+            queue: QueueWatch::default(),
             recovering: false,
             tick: 0,
             attach: Attach::new(config),
@@ -340,6 +310,11 @@ impl FineLoop {
         self.driver.as_ref()
     }
 
+    /// Whether the driver did not reach the drive of some joint in the last exchange. Host.
+    pub fn has_lost_joints(&self) -> bool {
+        self.feedback.state[..self.joints].contains(&JointState::Lost)
+    }
+
     /// What was switched last. The period that ends a program switches, and has no sample. Host.
     pub fn left(&self) -> Left {
         self.left
@@ -360,7 +335,7 @@ impl FineLoop {
         match &mut self.phase {
             Phase::Waiting => (*self.guard.position(), self.wait()),
             Phase::Following => self.follow(),
-            Phase::Parted => (self.stand(), self.wait_parted()),
+            Phase::AwaitingReplan => (self.stand(), self.await_replan()),
             Phase::HandedOver(hand) => {
                 let hand = *hand;
                 self.hand_over(hand)
@@ -395,7 +370,7 @@ impl FineLoop {
             return Input::Rest;
         }
         if self.given.abort || self.is_jog_let_go() {
-            return self.part(Stop::abort());
+            return self.end_epoch(Stop::abort());
         }
         let of_this_epoch = self.cursor.epoch() == 0
             || (self.depth.is_of(self.cursor.epoch()) && self.cursor.drop_older());

@@ -634,3 +634,35 @@ fn an_abort_that_finds_no_room_for_its_report_acts_when_the_joints_hold() {
         (vec![RestCause::Attached, RestCause::Abort], false)
     );
 }
+
+/// Joints are told the torque that homing may use while they are homed, those alone that have one, and no longer.
+#[test]
+fn torque_is_limited_for_joints_that_are_being_homed_and_have_a_limit_until_they_are_homed() {
+    for unhomed in 0..1 << JOINTS {
+        for homing_limits in 0..1 << JOINTS {
+            let limited = unhomed & homing_limits;
+            let plain = FineConfig {
+                unhomed,
+                homing_limits,
+                ..config(JOINTS)
+            };
+            let mut bench = Bench::new(&plain, Script::new(JOINTS));
+            attach(&mut bench, 10).expect("enabled");
+            for (told, _) in &bench.script().told {
+                assert_eq!(told.limited, limited, "{unhomed:b} {homing_limits:b}");
+            }
+            let mut left = limited;
+            for (joint, number) in (0..JOINTS).zip(0_i32..) {
+                bench.queue_event(EventKind::Homed, number, 0.0);
+                queue_move(&mut bench);
+                bench.ticks(250);
+                left &= !(1 << joint);
+                assert_eq!(
+                    bench.told().limited,
+                    left,
+                    "{unhomed:b} {homing_limits:b} {joint}"
+                );
+            }
+        }
+    }
+}

@@ -87,7 +87,7 @@ fn a_jog_is_let_go_in_the_period_in_which_its_keep_alive_is_late() {
     for most in [1, 2, 50] {
         let mut bench = cruising();
         let jog = &bench.host.controls.jog;
-        jog.most_periods.store(most, Relaxed);
+        jog.max_periods.store(most, Relaxed);
         jog.beats.fetch_add(1, Relaxed);
         tick(&mut bench, 1);
         // The beat is seen in this period; `most` periods later nobody has said anything.
@@ -111,7 +111,7 @@ fn missed_periods_count_for_the_keep_alive_and_are_counted_to_one() {
     bench.host.controls.hold.store(true, Relaxed);
     tick(&mut bench, 100);
     let jog = &bench.host.controls.jog;
-    jog.most_periods.store(50, Relaxed);
+    jog.max_periods.store(50, Relaxed);
     jog.beats.fetch_add(1, Relaxed);
     tick(&mut bench, 1);
     bench.fine.missed(48, 48);

@@ -249,7 +249,7 @@ impl Machine {
                 );
             }
             Phase::Jogging => {
-                controls.jog.most_periods.store(20, Relaxed);
+                controls.jog.max_periods.store(20, Relaxed);
                 self.queue(1.0, StopOn::default());
                 for _ in 0..(some_s / self.period_s) as u64 / 10 {
                     controls.jog.beats.fetch_add(1, Relaxed);
@@ -341,7 +341,7 @@ impl Machine {
         ] {
             flag.store(false, Relaxed);
         }
-        controls.jog.most_periods.store(0, Relaxed);
+        controls.jog.max_periods.store(0, Relaxed);
         let mut script = self.bench.script();
         script.move_to(position);
         script.told.clear();

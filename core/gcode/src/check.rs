@@ -6,9 +6,9 @@ use tandem_sdk::{Block, Curve, NurbsData};
 
 use crate::config::Config;
 use crate::diagnostic::{Diagnostic, Severity};
-use crate::fault::{Fault, Span};
 use crate::flow::{Execution, Step};
 use crate::item::Item;
+use crate::line_error::{LineError, Span};
 use crate::program::lines::{Next, Pass};
 use crate::program::{Program, ProgramError};
 
@@ -94,7 +94,7 @@ pub fn check(
     }
     pass.report
         .warnings
-        .extend(pass.execution.interpreter.note());
+        .extend(pass.execution.interpreter.notes());
     Ok(pass.report)
 }
 
@@ -172,8 +172,9 @@ impl<'a> FirstPass<'a> {
                              and this one does not; what follows would not be driven"
                         )
                     };
-                    let fault = Fault::new(Span::new(at, text.len()), "behind-percent", message);
-                    Diagnostic::new(&program.name, number, text, fault)
+                    let error =
+                        LineError::new(Span::new(at, text.len()), "behind-percent", message);
+                    Diagnostic::new(&program.name, number, text, error)
                 }
                 Ok(Next::Bad(diagnostic)) | Err(ProgramError::Text(diagnostic)) => diagnostic,
                 Err(other) => return Err(other),
@@ -223,7 +224,7 @@ impl<'a> FirstPass<'a> {
                     );
                 }
                 Item::Wait(_) => waits = true,
-                Item::Event(_) | Item::Command(_) | Item::End => {}
+                Item::Event(_) | Item::Command(_) | Item::Stated { .. } | Item::End => {}
             }
         }
         if waits {

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use tandem_sdk::{Axes, AxisVector, MAX_AXES};
 
 use crate::lasting::Lasting;
+use crate::stated::Watched;
 
 /// One row of the tool table.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -105,6 +106,8 @@ pub struct Config {
     pub subroutine_path: Vec<PathBuf>,
     /// How many lines a program with O-words may execute in the first pass, and in the second without an item.
     pub max_steps: u64,
+    /// Names whose values in the program somebody watches for: each becomes an [`crate::Item::Stated`].
+    pub watched: Vec<Watched>,
     /// What has lasted from the programs before; its tool table is to be that of `tools`. None where a program begins with
     /// nothing but this machine.
     pub lasting: Option<Arc<Lasting>>,
@@ -140,6 +143,7 @@ impl Config {
             user_commands: Vec::new(),
             subroutine_path: Vec::new(),
             max_steps: DEFAULT_MAX_STEPS,
+            watched: Vec::new(),
             lasting: None,
         }
     }

@@ -3,7 +3,7 @@
 use std::fmt::{self, Write as _};
 use std::sync::Arc;
 
-use crate::fault::{Fault, Span};
+use crate::line_error::{LineError, Span};
 
 /// Most characters of a line that are shown on either side of the column.
 const CONTEXT: usize = 60;
@@ -77,18 +77,18 @@ impl Diagnostic {
             file,
             line,
             text,
-            Fault::new(Span::new(0, text.len()), code, message),
+            LineError::new(Span::new(0, text.len()), code, message),
         )
     }
 
-    /// The error in `line`, or in the line before it that `fault` names.
-    pub(crate) fn new(file: &Arc<str>, line: u32, text: &[u8], fault: Fault) -> Self {
-        let (line, text) = fault
+    /// The error in `line`, or in the line before it that `error` names.
+    pub(crate) fn new(file: &Arc<str>, line: u32, text: &[u8], error: LineError) -> Self {
+        let (line, text) = error
             .line
             .as_ref()
             .map_or((line, text), |before| (before.number, &before.text));
-        let start = text.len().min(fault.span.start as usize);
-        let end = text.len().min(fault.span.end as usize).max(start);
+        let start = text.len().min(error.span.start as usize);
+        let end = text.len().min(error.span.end as usize).max(start);
         let column = 1 + characters(&text[..start]);
         let (excerpt, caret) = excerpt(text, start);
         Self {
@@ -97,11 +97,11 @@ impl Diagnostic {
             line,
             column,
             end_column: column + characters(&text[start..end]).max(1),
-            code: fault.code,
-            message: fault.message,
+            code: error.code,
+            message: error.message,
             excerpt,
             caret,
-            sketch: fault.sketch,
+            sketch: error.sketch,
         }
     }
 }
@@ -175,8 +175,8 @@ mod tests {
     use super::*;
 
     fn shown(text: &[u8], start: usize, end: usize) -> String {
-        let fault = Fault::new(Span::new(start, end), "test", "no good");
-        Diagnostic::new(&"part.ngc".into(), 7, text, fault).to_string()
+        let error = LineError::new(Span::new(start, end), "test", "no good");
+        Diagnostic::new(&"part.ngc".into(), 7, text, error).to_string()
     }
 
     #[test]

@@ -7,13 +7,14 @@ use tandem_sdk::AxisVector;
 
 use crate::config::Config;
 use crate::diagnostic::{Diagnostic, Severity};
-use crate::fault::{Checked, Fault, Span};
 use crate::flow::{by_hand, o_word};
 use crate::item::{Item, ProbeResult};
 use crate::line::Line;
+use crate::line_error::{Checked, LineError, Span};
 use crate::state::State;
 use crate::state::letters::Letters;
 use crate::state::parameters::{Parameters, Value};
+use crate::stated::{self, Unknown};
 use crate::syntax::expression::Context;
 use crate::syntax::line_words::{LineWords, Target};
 use crate::syntax::parse::{O_WORDS, parse};
@@ -70,6 +71,8 @@ pub struct Interpreter {
     /// The line that blocks and events bear, where it is not the one that is read: lines of a subroutine's own file bear
     /// that of the call.
     pub(crate) reported_line: Option<u32>,
+    /// The first comment that states what cannot be read for a name that is watched.
+    unknown: Option<Unknown>,
 }
 
 impl Interpreter {
@@ -96,6 +99,7 @@ impl Interpreter {
             begun: false,
             reads_assumed: Cell::new(false),
             reported_line: None,
+            unknown: None,
             config,
         }
     }
@@ -135,15 +139,21 @@ impl Interpreter {
         self.reads_assumed.set(false);
     }
 
-    /// What is worth to be known of the program as a whole: that lengths of tools were taken as zero.
-    pub(crate) fn note(&self) -> Option<Diagnostic> {
-        let line = self.state.tools.assumed_zero?;
-        let message = "the machine has no tool table: the length of every tool is taken as zero";
-        let note = Diagnostic::whole_line(&self.file, line, b"", "tool-length", message.into());
-        Some(Diagnostic {
+    /// What is worth to be known of the program as a whole: that lengths of tools were taken as zero, that a comment states
+    /// for a watched name what cannot be read.
+    pub(crate) fn notes(&self) -> impl Iterator<Item = Diagnostic> {
+        let note = |line, code, message| Diagnostic {
             severity: Severity::Warning,
-            ..note
-        })
+            ..Diagnostic::whole_line(&self.file, line, b"", code, message)
+        };
+        let lengths = self.state.tools.assumed_zero.map(|line| {
+            let message =
+                "the machine has no tool table: the length of every tool is taken as zero";
+            note(line, "tool-length", message.to_owned())
+        });
+        let stated = self.unknown.as_ref();
+        let stated = stated.map(|unknown| note(unknown.line, "stated", unknown.message.clone()));
+        lengths.into_iter().chain(stated)
     }
 
     /// A subroutine begins.
@@ -248,7 +258,7 @@ impl Interpreter {
         self.state.compensation = Compensation::default();
     }
 
-    /// Manual input: an abort, a fault or an emergency stop has switched spindle and coolant off, and outputs as the machine file
+    /// Manual input: an abort, a error or an emergency stop has switched spindle and coolant off, and outputs as the machine file
     /// says; what the next line asks for is sent, whatever it was before.
     pub fn set_switched_off(&mut self) {
         self.state.spindle.direction = 0;
@@ -301,23 +311,27 @@ impl Interpreter {
         if self.state.ended {
             return Ok(());
         }
-        if !self.state.subprograms.obeyed
-            && let Some(at) = o_word::find(text, self.config.block_delete)
-            && by_hand::is_call(text, at)
-        {
+        if self.calls(text) {
             return by_hand::call(self, number, text, out);
         }
         let items_before = out.len();
         let (next_index, at_rest) = (self.state.path.next_index, self.state.path.at_rest);
         self.state.line = self.reported_line.unwrap_or(number);
-        self.run(text, out).map_err(|fault| {
+        self.run(text, out).map_err(|error| {
             out.truncate(items_before);
             let path = &mut self.state.path;
             path.next_index = next_index;
             path.at_rest = at_rest;
             path.last_end = path.position;
-            Diagnostic::new(&self.file, number, text, fault)
+            Diagnostic::new(&self.file, number, text, error)
         })
+    }
+
+    /// Whether [`Self::line`] executes the subroutine that `text` calls, and reads its file.
+    pub fn calls(&self, text: &[u8]) -> bool {
+        !self.state.subprograms.obeyed
+            && o_word::find(text, self.config.block_delete)
+                .is_some_and(|at| by_hand::is_call(text, at))
     }
 
     /// Ends the program at the end of its text, as M2 would.
@@ -344,7 +358,7 @@ impl Interpreter {
         let beside = compensation::off(&mut self.execution(out));
         stop::end(&mut self.execution(out));
         open.and(beside)
-            .map_err(|fault| Diagnostic::new(&self.file, last_line, b"", fault))
+            .map_err(|error| Diagnostic::new(&self.file, last_line, b"", error))
     }
 
     /// The current line with the state that it changes.
@@ -378,14 +392,53 @@ impl Interpreter {
             reads_assumed: &self.reads_assumed,
         };
         let parsed = parse(text, from, &context, &mut self.words);
+        if !self.config.watched.is_empty() && parsed.is_ok() {
+            self.look_for_watched(text, out);
+        }
         let of_curve = self.state.curves.goes_on(&self.words);
         let done = match of_curve {
             Ok(true) => self.curve_line(parsed, out),
             Ok(false) => self.obey(parsed, out),
-            Err(fault) => self.obey(parsed.and(Err(fault)), out),
+            Err(error) => self.obey(parsed.and(Err(error)), out),
         };
         self.state.curves.note(self.state.line, text);
         done
+    }
+
+    /// What the line, which has been read, states of the names that are watched holds for its own motion already.
+    #[cold]
+    fn look_for_watched(&mut self, text: &[u8], out: &mut Vec<Item>) {
+        let Self {
+            config,
+            state,
+            words,
+            unknown,
+            ..
+        } = self;
+        let mut push = |item| {
+            if state.compensation.holds() {
+                state.compensation.hold(item);
+            } else {
+                out.push(item);
+            }
+        };
+        let wrong = stated::of_comments(text, &config.watched, &mut push);
+        if let (Some(message), None) = (wrong, &unknown) {
+            *unknown = Some(Unknown {
+                line: state.line,
+                message,
+            });
+        }
+        for assignment in &words.assignments {
+            let Target::Named(range) = &assignment.target else {
+                continue;
+            };
+            let name = &words.names[range.clone()];
+            if let Some(which) = stated::of_parameter(name, &config.watched) {
+                let value = assignment.value;
+                push(Item::Stated { which, value });
+            }
+        }
     }
 
     /// Executes a line of an open curve, if it could be read.
@@ -431,7 +484,7 @@ impl Interpreter {
     fn refuse_number(&mut self) -> Checked<()> {
         let of_subprogram = self.state.subprograms.obeyed && self.words.is_number_of_program();
         if self.words.has(b'O') && self.begun && !of_subprogram {
-            return Err(self.words.fault(b'O', "o-word", O_WORDS));
+            return Err(self.words.error(b'O', "o-word", O_WORDS));
         }
         self.begun |= !self.words.is_empty();
         Ok(())
@@ -461,7 +514,7 @@ impl Interpreter {
         scanner.advance(1);
         scanner.skip_ignorable()?;
         if !scanner.at_end() {
-            return Err(Fault::new(
+            return Err(LineError::new(
                 scanner.since(start),
                 "percent",
                 "% stands on a line of its own",
@@ -494,7 +547,7 @@ impl Interpreter {
                         assignment.value,
                         assumed,
                     ) {
-                        return Err(Fault::new(
+                        return Err(LineError::new(
                             assignment.span,
                             "parameter-name",
                             "there are too many named parameters",
@@ -508,9 +561,9 @@ impl Interpreter {
 }
 
 #[cold]
-fn too_long(length: usize) -> Fault {
+fn too_long(length: usize) -> LineError {
     let message = format!(
         "the line has {length} bytes, {MAX_LINE_BYTES} are allowed: this is hardly a part program"
     );
-    Fault::new(Span::new(0, 1), "line-long", message)
+    LineError::new(Span::new(0, 1), "line-long", message)
 }

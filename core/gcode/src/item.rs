@@ -20,6 +20,14 @@ pub enum Item {
     Wait(InputWait),
     /// M100 to M199: the machine is at rest, and the program goes on when the command is over. Simulations pass over it.
     Command(UserCommand),
+    /// The program states `value` for number `which` of [`crate::Config::watched`], NaN where that is no value: it holds for
+    /// the blocks that follow.
+    Stated {
+        /// Index of the name.
+        which: usize,
+        /// What it is from here on.
+        value: f64,
+    },
     /// The program is over (M2, M30, `%` or the end of the file). Nothing follows.
     End,
 }

@@ -30,7 +30,8 @@
 //! - M6 stops the spindle.
 //! - G38.2 to G38.5 are modal as in LinuxCNC, G31 holds for its line as on Fanuc. None of them goes with G93 or G53.
 //! - EQ and NE forgive a difference of 0.0001, as in LinuxCNC. A blank within a number is an error.
-//! - A comment may hold pairs of parentheses. What a comment says (MSG, PRINT, LOG) is not acted upon.
+//! - A comment may hold pairs of parentheses. What a comment says (MSG, PRINT, LOG) is not acted upon,
+//!   but for the names of [`Config::watched`].
 //! - Stored positions and offsets (#5161 to #5410) read in mm and degrees, the current position (#5420…) in program
 //!   units. A run writes no parameter file.
 
@@ -42,14 +43,15 @@ extern crate self as tandem_gcode;
 mod check;
 mod config;
 mod diagnostic;
-mod fault;
 mod flow;
 mod interpreter;
 mod item;
 mod lasting;
 mod line;
+mod line_error;
 mod program;
 mod state;
+mod stated;
 mod stream;
 mod syntax;
 #[cfg(test)]
@@ -66,5 +68,6 @@ pub use interpreter::{Interpreter, MAX_LINE_BYTES};
 pub use item::{Input, InputMode, InputWait, Item, ProbeResult, UserCommand};
 pub use lasting::{Lasting, Ledger, Moment, WORK_SYSTEMS, system_code};
 pub use program::{Program, ProgramError};
+pub use stated::Watched;
 pub use stream::Stream;
 pub use words::{KnownWord, docs, known_words};

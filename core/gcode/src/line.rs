@@ -6,8 +6,8 @@ use std::fmt::Write as _;
 use tandem_sdk::{AxisVector, Block, BlockKind, Event, EventKind};
 
 use crate::config::Config;
-use crate::fault::{Checked, Fault, Span, show};
 use crate::item::Item;
+use crate::line_error::{Checked, LineError, Span, show};
 use crate::state::letters::{AXIS_MASK, Letters, mask};
 use crate::state::{MotionMode, State};
 use crate::syntax::line_words::LineWords;
@@ -313,7 +313,7 @@ impl Line<'_> {
     }
 
     #[cold]
-    fn no_inverse_time(&self) -> Fault {
+    fn no_inverse_time(&self) -> LineError {
         let curve = self
             .special_motion()
             .is_some_and(|word| word.shape() == Some(Shape::Curve));
@@ -326,7 +326,7 @@ impl Line<'_> {
     }
 
     #[cold]
-    fn no_feed(&self) -> Fault {
+    fn no_feed(&self) -> LineError {
         let why = if self.words.has(b'F') {
             "the feed is zero"
         } else {
@@ -416,7 +416,7 @@ impl Line<'_> {
     }
 
     #[cold]
-    fn beyond_travel(&self, axis: usize, value: f64) -> Fault {
+    fn beyond_travel(&self, axis: usize, value: f64) -> LineError {
         let rotary = self.letters.is_rotary(axis);
         let shown = |v: f64| show(if rotary { v.to_degrees() } else { v });
         let unit = if rotary { "deg" } else { "mm" };
@@ -434,27 +434,27 @@ impl Line<'_> {
         }
         message.push(')');
         if self.words.has(letter) {
-            self.words.fault(letter, "travel", message)
+            self.words.error(letter, "travel", message)
         } else if self.orders.axes_taken {
-            self.orders.fault(Group::NonModal, "travel", message)
+            self.orders.error(Group::NonModal, "travel", message)
         } else {
             self.motion_fault("travel", message)
         }
     }
 
-    /// A fault at the motion word, or at the first axis word where the motion is modal.
-    pub fn motion_fault(&self, code: &'static str, message: impl Into<String>) -> Fault {
+    /// A error at the motion word, or at the first axis word where the motion is modal.
+    pub fn motion_fault(&self, code: &'static str, message: impl Into<String>) -> LineError {
         match self.words.first_of(AXIS_MASK) {
-            _ if self.orders.has(Group::Motion) => self.orders.fault(Group::Motion, code, message),
-            Some((_, span)) => Fault::new(span, code, message),
-            None => Fault::new(Span::new(0, 1), code, message),
+            _ if self.orders.has(Group::Motion) => self.orders.error(Group::Motion, code, message),
+            Some((_, span)) => LineError::new(span, code, message),
+            None => LineError::new(Span::new(0, 1), code, message),
         }
     }
 
     /// Motions other than G0 and G1 do not go with G53.
     pub fn refuse_machine_coordinates(&self) -> Checked<()> {
         if self.in_machine_coordinates() {
-            return Err(self.orders.fault(
+            return Err(self.orders.error(
                 Group::NonModal,
                 "conflict",
                 "G53 goes with G0 and G1 only",

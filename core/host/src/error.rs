@@ -1,7 +1,7 @@
 //! Why a run does not start, or cannot go on.
 
 use tandem_gcode::{CheckReport, ProgramError};
-use tandem_machine::{Machine, MachineError, Place};
+use tandem_machine::{Machine, MachineError, ValuePlace};
 
 /// A refusal: nothing has moved.
 #[derive(Debug, thiserror::Error)]
@@ -31,7 +31,7 @@ pub enum HostError {
 /// A refusal with the place in the machine file.
 pub fn refusal(machine: &Machine, key: &str, cause: impl Into<String>) -> HostError {
     let place = match machine.place(key) {
-        Place::Override(path) if path == key => Place::Override(path).to_string(),
+        ValuePlace::Override(path) if path == key => ValuePlace::Override(path).to_string(),
         place => format!("{place}: {key}"),
     };
     HostError::Setup {

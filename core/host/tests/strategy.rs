@@ -248,3 +248,55 @@ fn both_clocks_send_the_same_samples_up_to_the_fault() {
     };
     assert!(commands(&samples) == commands(&expected));
 }
+
+/// Refuses, and says what it was told of the machine.
+#[allow(clippy::unnecessary_wraps)] // the form of a constructor
+fn tell(_options: &RawOptions, context: &StrategyContext) -> Result<Loaded, PluginError> {
+    let joints = context.joints[..context.joint_count as usize].iter();
+    let joints: Vec<String> = joints
+        .map(|joint| {
+            format!(
+                "{} {}",
+                joint.name.as_str(),
+                joint.limits.acceleration_mm_per_s2
+            )
+        })
+        .collect();
+    Err(PluginError::new(format!(
+        "{}; x {} mm/s; coolant {:?}, door {:?}, nothing {:?}",
+        joints.join(", "),
+        context.limits.axes()[0].feed_mm_per_s,
+        context.analog_input("coolant_c"),
+        context.digital_input("door"),
+        context.digital_input("")
+    )))
+}
+
+#[test]
+fn a_strategy_is_told_joints_limits_and_the_names_of_inputs() {
+    let mut registry = Registry::default();
+    let told = tandem_sdk::local_plugin!(feed_strategy "told" = tell);
+    for plugin in [tandem_look_ahead::PLUGIN, tandem_sim::PLUGIN, told] {
+        registry.register(plugin).unwrap();
+    }
+    let settings = [
+        ("feed_strategy.plugin", "told"),
+        ("driver.analog", "[\"load\", \"coolant_c\"]"),
+        ("inputs.door.input", "5"),
+    ];
+    let settings = settings.map(|(key, value)| (key.to_string(), value.to_string()));
+    let gantry = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/gantry.toml");
+    let machine = Machine::read(&gantry, &settings).unwrap();
+    let feed_mm_per_s = machine.limits.axes()[0].feed_mm_per_s;
+    let program = Program::spool("line", &b"G21 G90\nF5000\nG1 X60\nM2\n"[..]).unwrap();
+    let refused = Run::prepare(machine, &registry, program, Switches::default())
+        .err()
+        .unwrap()
+        .to_string();
+    let expected = format!("x {feed_mm_per_s} mm/s; coolant Some(1), door Some(5), nothing None");
+    assert!(refused.contains(&expected), "{refused}");
+    assert!(
+        refused.contains("y1 ") && refused.contains(", y2 800"),
+        "{refused}"
+    );
+}

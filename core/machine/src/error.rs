@@ -7,7 +7,7 @@ use crate::shown::one_line;
 
 /// Where a value comes from.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Place {
+pub enum ValuePlace {
     /// A place in a file.
     File {
         /// The file, as it was named.
@@ -23,7 +23,7 @@ pub enum Place {
     Override(String),
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for ValuePlace {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::File { path, line, column } => write!(f, "{}:{line}:{column}", path.display()),
@@ -37,7 +37,7 @@ impl fmt::Display for Place {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Problem {
     /// Where.
-    pub place: Place,
+    pub place: ValuePlace,
     /// The dotted path of the key concerned; empty where the text is not TOML or cannot be read.
     pub key: String,
     /// What is wrong, and what would be right where that is known.
@@ -46,7 +46,7 @@ pub struct Problem {
 
 impl fmt::Display for Problem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let said = matches!(&self.place, Place::Override(key) if *key == self.key);
+        let said = matches!(&self.place, ValuePlace::Override(key) if *key == self.key);
         let key = if said || self.key.is_empty() {
             String::new()
         } else {

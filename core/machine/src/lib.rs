@@ -48,8 +48,8 @@ mod units;
 mod values;
 
 pub use drivers::{DriverChoice, Owned};
-pub use error::{MachineError, Place, Problem};
-pub use homing::{AxisHoming, DriveHoming, HomingBy, SwitchHoming};
+pub use error::{MachineError, Problem, ValuePlace};
+pub use homing::{AxisHoming, DriveHoming, Foot, HomingBy, IndexPulse, SwitchHoming};
 pub use inputs::{Input, Role};
 pub use joints::Joint;
 pub use keys::{Key, keys, markdown, tool_keys};

@@ -6,7 +6,7 @@ use tandem_sdk::{Axes, AxisVector, Limits};
 
 use crate::axes::AxisSet;
 use crate::drivers::{self, DriverChoice, Wanted};
-use crate::error::{MachineError, Place};
+use crate::error::{MachineError, ValuePlace};
 use crate::homing::{self, AxisHoming};
 use crate::inputs::{self, Input};
 use crate::joints::{self, Joint};
@@ -174,7 +174,7 @@ impl Machine {
 
     /// Where the key at a dotted path was written, else the table around it, else the beginning of the file: for
     /// refusals by those who read more than this crate does, such as a plugin its options.
-    pub fn place(&self, key: &str) -> Place {
+    pub fn place(&self, key: &str) -> ValuePlace {
         self.places.of(key)
     }
 }
@@ -191,9 +191,10 @@ impl Moving {
     fn read(root: &Section<'_>, axes: AxisSet, motion: &Motion, problems: &Problems) -> Self {
         let tools = Some(root.section("tools")).filter(Section::exists);
         let tools = tools.and_then(|section| ToolTable::read(&section, &axes.axes, problems));
+        let joints = joints::read(root, &axes, motion);
         Self {
-            joints: joints::read(root, &axes, motion),
-            homing: homing::read(root, &axes),
+            homing: homing::read(root, &axes, &joints),
+            joints,
             tools: tools.unwrap_or_default(),
             axes,
         }
@@ -289,10 +290,15 @@ impl Tables {
                 .to_string()
         };
         let axes: Vec<_> = (0..moving.axes.axes.count()).map(letter).collect();
-        let homing = moving.homing.iter().filter_map(|homing| {
-            homing
-                .switch()
-                .map(|switch| (switch.input, format!("homing.{}", axes[homing.axis])))
+        let homing = moving.homing.iter().flat_map(|homing| {
+            let table = homing.table(&moving.axes.axes, &moving.joints);
+            let switch = homing.switch();
+            let index = switch.and_then(|switch| switch.index);
+            let inputs = [switch.map(|of| of.input), index.map(|of| of.input)];
+            inputs
+                .into_iter()
+                .flatten()
+                .map(move |input| (input, format!("homing.{table}")))
         });
         let probe = self
             .probe

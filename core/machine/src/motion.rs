@@ -46,9 +46,9 @@ impl Motion {
         let modes = [("limit", JerkMode::Limit), ("report", JerkMode::Report)];
         let time_constant_s = motion.at_least("time_constant_ms", 0.0).unwrap_or(50.0) / 1000.0;
         let time_constant_range_s = time_constant_range(motion);
-        let (least_s, most_s) = time_constant_range_s.unwrap_or((0.0, LONGEST_S));
-        if !(least_s..=most_s).contains(&time_constant_s) {
-            let (least, most) = (least_s * 1000.0, most_s * 1000.0);
+        let (min_s, max_s) = time_constant_range_s.unwrap_or((0.0, LONGEST_S));
+        if !(min_s..=max_s).contains(&time_constant_s) {
+            let (least, most) = (min_s * 1000.0, max_s * 1000.0);
             motion.refuse(
                 "time_constant_ms",
                 format!("must be {least} to {most}, the time constants of this machine"),

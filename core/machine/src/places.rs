@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::error::Place;
+use crate::error::ValuePlace;
 use crate::node::{Node, Table};
 use crate::problems::{Origin, Source, place};
 
@@ -52,7 +52,7 @@ impl Places {
     }
 
     /// Where `key` was written, else the table around it, else the beginning of the machine's file.
-    pub fn of(&self, key: &str) -> Place {
+    pub fn of(&self, key: &str) -> ValuePlace {
         let parents = std::iter::successors(Some(key), |key| {
             key.rsplit_once('.').map(|(parent, _)| parent)
         });

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
-use crate::error::{MachineError, Place, Problem};
+use crate::error::{MachineError, Problem, ValuePlace};
 
 /// After so many problems the rest is not looked for: it would hide the first ones.
 const MAX_PROBLEMS: usize = 100;
@@ -95,7 +95,7 @@ impl Problems {
     }
 
     /// The place that people read.
-    pub fn place(&self, origin: Origin) -> Place {
+    pub fn place(&self, origin: Origin) -> ValuePlace {
         place(&self.sources.borrow(), origin)
     }
 
@@ -134,19 +134,19 @@ impl Problems {
 }
 
 /// The place that people read.
-pub fn place(sources: &[Source], origin: Origin) -> Place {
+pub fn place(sources: &[Source], origin: Origin) -> ValuePlace {
     match sources.get(origin.source) {
         Some(Source::File { path, text }) => {
             let (line, column) = position(text, origin.offset);
-            Place::File {
+            ValuePlace::File {
                 path: path.clone(),
                 line,
                 column,
             }
         }
-        Some(Source::Unreadable(path)) => Place::Whole(path.clone()),
-        Some(Source::Override(key)) => Place::Override(key.clone()),
-        None => Place::Whole(PathBuf::new()),
+        Some(Source::Unreadable(path)) => ValuePlace::Whole(path.clone()),
+        Some(Source::Override(key)) => ValuePlace::Override(key.clone()),
+        None => ValuePlace::Whole(PathBuf::new()),
     }
 }
 

@@ -1,6 +1,6 @@
 //! Which keys are known, and what an unknown one was probably meant to be.
 
-use crate::error::Place;
+use crate::error::ValuePlace;
 use crate::keys::Key;
 use crate::nearest::nearest;
 use crate::node::{Node, Table, Value};
@@ -88,7 +88,7 @@ fn unknown(keys: &[Key], path: &[&str], node: &Node, rotary: bool, problems: &Pr
     let hint = nearest(keys, path, rotary).map(|found| {
         problems.suggest(&found.path);
         // A name in the same table is told alone, as it would be written there; an override is always a whole path.
-        let whole = matches!(problems.place(node.origin), Place::Override(_));
+        let whole = matches!(problems.place(node.origin), ValuePlace::Override(_));
         let name = if whole { &found.path } else { found.name() };
         let verb = if found.close {
             "did you mean"

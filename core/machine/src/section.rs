@@ -1,6 +1,6 @@
 //! Reading one table: every value is checked as it is read, and what is wrong is noted.
 
-use crate::error::Place;
+use crate::error::ValuePlace;
 use crate::node::{Node, Table, Value};
 use crate::problems::{Origin, Problems};
 use crate::shown::dotted;
@@ -109,13 +109,13 @@ impl<'a> Section<'a> {
     }
 
     /// Where `key` is written, else this table.
-    pub fn place(&self, key: &str) -> Place {
+    pub fn place(&self, key: &str) -> ValuePlace {
         self.problems
             .place(self.node(key).map_or(self.origin, |node| node.origin))
     }
 
     /// Where `node` is written.
-    pub fn place_of(&self, node: &Node) -> Place {
+    pub fn place_of(&self, node: &Node) -> ValuePlace {
         self.problems.place(node.origin)
     }
 

@@ -5,6 +5,7 @@
 mod arc;
 pub mod blocks;
 mod geometry;
+mod lanes;
 pub mod nurbs;
 mod path;
 mod profile;

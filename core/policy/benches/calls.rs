@@ -7,37 +7,32 @@ use divan::Bencher;
 use divan::counter::ItemsCount;
 use tandem_policy::abi::block as at;
 use tandem_policy::{Bounds, Budget, Engine, Facts, Instance, Period, Policy, Record};
-use tandem_sdk::{Axes, AxisVector, Block, BlockKind};
+use tandem_sdk::{AxisVector, Block, BlockKind};
 
-const SCRIPTS: [&str; 5] = [
+const SCRIPTS: [&str; 9] = [
     "nothing",
     "half-feed",
+    "v1/gentle-start",
     "gentle-start",
+    "v1/material-feed",
     "material-feed",
+    "v1/corner-time-constant",
     "corner-time-constant",
+    "gentle-plunge",
 ];
 
 fn main() {
     divan::main();
 }
 
-/// The bytes of a script: a built one, or a fixture in text form.
+/// The bytes of a script: a built one, one of version 1 of the ABI, or a fixture in text form.
 fn bytes(name: &str) -> Vec<u8> {
     let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
     let built = std::fs::read(format!("{root}/scripts/policies/{name}.wasm"));
-    built.unwrap_or_else(|_| {
+    let old = || std::fs::read(format!("{root}/tests/fixtures/policies/{name}.wasm"));
+    built.or_else(|_| old()).unwrap_or_else(|_| {
         std::fs::read(format!("{root}/tests/fixtures/policies/good/{name}.wat")).unwrap()
     })
-}
-
-fn facts() -> Facts {
-    let axes = Axes::new(&[('X', false), ('Y', false), ('Z', false)]).unwrap();
-    Facts {
-        axes,
-        time_constant_s: 0.05,
-        path_tolerance_mm: 0.01,
-        rough_period_s: 0.008,
-    }
 }
 
 fn policy(name: &str) -> Policy {
@@ -47,7 +42,7 @@ fn policy(name: &str) -> Policy {
         vec![],
         Budget::default(),
         Bounds::default(),
-        &facts(),
+        &Facts::default(),
     )
     .unwrap()
 }
@@ -130,18 +125,19 @@ fn window<const BLOCKS: usize>(bencher: Bencher, name: &str) {
     let script = Engine::new().unwrap().compile(&bytes(name)).unwrap();
     let mut instance = Instance::new(&script, &Budget::default(), &[]).unwrap();
     let records: Vec<_> = (0..BLOCKS).map(record).collect();
+    let (sights, geometries) = (vec![[0; 72]; BLOCKS], vec![[0; 448]; BLOCKS]);
     let mut asks = Vec::with_capacity(64);
     bencher.counter(ItemsCount::new(BLOCKS)).bench_local(|| {
         asks.clear();
         instance
-            .blocks(divan::black_box(&records), &mut asks)
+            .blocks(divan::black_box(&records), &sights, &geometries, &mut asks)
             .unwrap();
     });
 }
 
-#[divan::bench(sample_size = 256)]
-fn period(bencher: Bencher) {
-    let mut policy = policy("load-feed");
+#[divan::bench(args = ["v1/load-feed", "load-feed", "keep-contour"], sample_size = 256)]
+fn period(bencher: Bencher, name: &str) {
+    let mut policy = policy(name);
     let means = Period {
         duration_s: 0.008,
         cutting_torque_nm: 2.0,

@@ -1,12 +1,13 @@
-//! The ABI between host and module, version 1: names of the exports, and where each number lies in linear memory.
+//! The ABI between host and module, versions 1 and 2: names of the exports, and where each number lies in linear memory.
 //!
 //! `docs/policies.md` holds the same as a table. All numbers are little-endian. Every structure begins with its size, so
-//! that a later version can append to it.
+//! that a later version can append to it: version 2 is version 1 with more behind it, and a module of version 1 gets what
+//! it always got.
 
-/// Version of the ABI.
-pub const VERSION: u32 = 1;
-/// Name of the export that gives the address of the [`layout`]; its number is the version of the ABI.
-pub const LAYOUT_EXPORT: &str = "tandem_policy_v1";
+/// Latest version of the ABI.
+pub const VERSION: u32 = 2;
+/// Names of the export that gives the address of the [`layout`], by version from 1 on.
+pub const LAYOUT_EXPORTS: [&str; VERSION as usize] = ["tandem_policy_v1", "tandem_policy_v2"];
 /// What that name begins with, whatever the version.
 pub const LAYOUT_PREFIX: &str = "tandem_policy_v";
 /// Name of the exported memory.
@@ -50,6 +51,47 @@ pub mod layout {
     pub const STATE_BYTES: usize = 44;
     /// Size of the structure in version 1.
     pub const BYTES: usize = 48;
+    /// Version 2: address of the first input.
+    pub const INPUTS: usize = 48;
+    /// Version 2: bytes from one input to the next.
+    pub const INPUT_BYTES: usize = 52;
+    /// Version 2: number of inputs.
+    pub const INPUT_COUNT: usize = 56;
+    /// Size of the structure in version 2; its last word is reserved.
+    pub const BYTES_V2: usize = 64;
+}
+
+/// One input that a module of version 2 wants to see, by its name: a value that the part program states, a signal of the
+/// machine, or an axis.
+pub mod input {
+    /// Size of the structure, `u32`.
+    pub const SIZE: usize = 0;
+    /// What it is, `u32`: [`PROGRAM`], [`SIGNAL`] or [`AXIS`].
+    pub const KIND: usize = 4;
+    /// Address of the name, `u32`.
+    pub const NAME: usize = 8;
+    /// Bytes of the name, `u32`.
+    pub const NAME_BYTES: usize = 12;
+    /// Address of the words that a program may state instead of numbers, separated by commas, `u32`.
+    pub const WORDS: usize = 16;
+    /// Bytes of the words, `u32`.
+    pub const WORDS_BYTES: usize = 20;
+    /// 1 where the module can do without, `u32`.
+    pub const OPTIONAL: usize = 24;
+    /// Where its value stands, `u32`, written by the host before the first call: index into [`super::block::PROGRAM`], into
+    /// [`super::period::SIGNALS`], or of the axis. [`NOWHERE`] where this machine has none.
+    pub const PLACE: usize = 28;
+    /// Size of the structure.
+    pub const BYTES: usize = 32;
+
+    /// A value that the part program states: a named parameter, or `name = value` in a comment.
+    pub const PROGRAM: u32 = 0;
+    /// A signal of the feed strategy, an analog or a digital input, by its name in the machine file.
+    pub const SIGNAL: u32 = 1;
+    /// An axis, by its letter.
+    pub const AXIS: u32 = 2;
+    /// There is none.
+    pub const NOWHERE: u32 = u32::MAX;
 }
 
 /// One parameter that a module declares.
@@ -114,6 +156,29 @@ pub mod block {
     pub const ASK_FEED_CAP: usize = 112;
     /// Size of the structure in version 1.
     pub const BYTES: usize = 120;
+    /// Version 2: diameter of the tool in the spindle, mm; NaN where the tool table has none.
+    pub const TOOL_DIAMETER: usize = 120;
+    /// Version 2: what the program has stated of each input of the kind [`super::input::PROGRAM`], eight of them; NaN where
+    /// nothing is in force.
+    pub const PROGRAM: usize = 128;
+    /// Size of the structure in version 2 for a module that does not look at the geometry behind it.
+    pub const BYTES_SMALL: usize = 192;
+    /// Version 2: where the block starts, machine coordinates per axis, mm or rad. This and what follows are eight each.
+    pub const START: usize = 192;
+    /// Version 2: where it ends.
+    pub const END: usize = 256;
+    /// Version 2: program coordinate = machine coordinate − offset.
+    pub const OFFSET: usize = 320;
+    /// Version 2: how far each axis moves for each mm of the path, at the start: the direction; 0 where nothing moves.
+    pub const START_DIRECTION: usize = 384;
+    /// Version 2: the same at the end.
+    pub const END_DIRECTION: usize = 448;
+    /// Version 2: the lowest that it is anywhere in the block, with its sign; of a curve at 17 places.
+    pub const LOWEST_SHARE: usize = 512;
+    /// Version 2: the highest.
+    pub const HIGHEST_SHARE: usize = 576;
+    /// Size of the structure in version 2.
+    pub const BYTES_V2: usize = 640;
 
     /// Flag: the machine is at rest at the start of the block.
     pub const STARTS_AT_REST: u32 = 1;
@@ -157,6 +222,21 @@ pub mod period {
     pub const CURRENT: usize = 112;
     /// Size of the structure in version 1.
     pub const BYTES: usize = 176;
+    /// Version 2: position commanded at the end of the period, per axis, mm or rad. This and the next four are eight each.
+    pub const POSITION: usize = 176;
+    /// Version 2: speed measured, mean, mm/s or rad/s.
+    pub const SPEED: usize = 240;
+    /// Version 2: position commanded less measured, mean, mm or rad.
+    pub const AXIS_ERROR: usize = 304;
+    /// Version 2: its largest magnitude.
+    pub const MAX_AXIS_ERROR: usize = 368;
+    /// Version 2: the signals of the inputs of the kind [`super::input::SIGNAL`], sixteen of them, means; of a digital input
+    /// the share of the period in which it was 1.
+    pub const SIGNALS: usize = 432;
+    /// Version 2: rate of program time, mean, 0 to 1.
+    pub const SIGMA: usize = 560;
+    /// Size of the structure in version 2.
+    pub const BYTES_V2: usize = 568;
 }
 
 /// Writes an unsigned number at `at`.

@@ -38,9 +38,9 @@ pub struct Counters {
     /// Times a new script was refused and the old one kept.
     pub refused_reloads: u64,
     /// Most fuel that a window used.
-    pub most_window_fuel: u64,
+    pub max_window_fuel: u64,
     /// Most fuel that a rough period used.
-    pub most_period_fuel: u64,
+    pub max_period_fuel: u64,
 }
 
 impl Counters {

@@ -21,7 +21,7 @@ pub enum Refusal {
     #[error("it imports {}: a policy script needs no imports", .0.join(", "))]
     Imports(Vec<String>),
     /// It is written for another version of the ABI.
-    #[error("it speaks version {0} of the policy ABI, this host speaks version {v}", v = crate::abi::VERSION)]
+    #[error("it speaks version {0} of the policy ABI, this host speaks versions 1 to {v}", v = crate::abi::VERSION)]
     OtherVersion(String),
     /// Exports are missing or of another type.
     #[error("{}", .0.join("; "))]
@@ -35,6 +35,9 @@ pub enum Refusal {
     /// Parameters of the machine file do not fit, a sentence each.
     #[error("{}", .0.join("; "))]
     Parameters(Vec<String>),
+    /// It wants to see what this machine or this run does not have, a sentence each.
+    #[error("{}", .0.join("; "))]
+    Inputs(Vec<String>),
     /// State of the script before could not be handed over.
     #[error("it does not take over the state of the script before: {0}")]
     Restore(Trouble),

@@ -5,11 +5,13 @@ use wasmtime::{Memory, Store, Trap, TypedFunc, WasmParams, WasmResults};
 use crate::abi;
 use crate::budget::Budget;
 use crate::error::{Refusal, Trouble};
+use crate::geometry::Geometry;
+use crate::inputs::{Input, Places};
 use crate::layout::Layout;
 use crate::limits::Limits;
 use crate::parameters::{Parameter, resolve};
-use crate::script::Script;
-use crate::window::{Asks, Record};
+use crate::script::{Script, layout_export};
+use crate::window::{Asks, Record, Sight};
 
 /// A live script. After an error of a call it must not be called again.
 pub struct Instance {
@@ -46,11 +48,11 @@ impl Instance {
             .get_memory(&mut store, abi::MEMORY_EXPORT)
             .ok_or_else(missing)?;
         let locate = instance
-            .get_typed_func::<(), u32>(&mut store, abi::LAYOUT_EXPORT)
+            .get_typed_func::<(), u32>(&mut store, layout_export(script.version))
             .map_err(|_| missing())?;
         let located = locate.call(&mut store, ());
         let address = located.map_err(|e| Refusal::Start(trouble(&mut store, &e, fuel)))?;
-        let layout = Layout::read(memory.data(&store), address)?;
+        let layout = Layout::read(memory.data(&store), address, script.version)?;
         let values = resolve(&layout.declared, stated)?;
         for (index, value) in values.iter().enumerate() {
             abi::put_f64(memory.data_mut(&mut store), layout.value(index), *value);
@@ -75,26 +77,65 @@ impl Instance {
         &self.layout.declared
     }
 
+    /// What the script wants to see.
+    pub fn inputs(&self) -> &[Input] {
+        &self.layout.inputs
+    }
+
+    /// Tells the script where its inputs are, before the first call.
+    pub fn place(&mut self, places: &Places) {
+        let memory = self.memory.data_mut(&mut self.store);
+        for (index, place) in places.told.iter().enumerate() {
+            abi::put_u32(memory, self.layout.place_of_input(index), *place);
+        }
+    }
+
+    /// Whether it looks at the geometry of blocks.
+    pub fn sees_geometry(&self) -> bool {
+        self.layout.block_bytes >= abi::block::BYTES_V2
+    }
+
     /// Pages of memory in use.
     pub fn memory_pages(&self) -> u64 {
         self.memory.size(&self.store)
     }
 
-    /// Hands over the window of `records`, and appends what is asked for to `asks`. Does not allocate where `asks` has room.
+    /// Hands over the window of `records`, and appends what is asked for to `asks`. A script of version 2 also gets `sights`,
+    /// and one that looks at the geometry of blocks `geometries`, one a record each; others pass them over. Does not allocate
+    /// where `asks` has room.
     ///
     /// # Errors
     /// What went wrong in the script. An infinite number in an answer is an error too.
-    pub fn blocks(&mut self, records: &[Record], asks: &mut Vec<Asks>) -> Result<(), Trouble> {
+    pub fn blocks(
+        &mut self,
+        records: &[Record],
+        sights: &[Sight],
+        geometries: &[Geometry],
+        asks: &mut Vec<Asks>,
+    ) -> Result<(), Trouble> {
         let Some(function) = &self.blocks else {
             return Ok(());
         };
         let (window, stride) = (self.layout.window, self.layout.block_bytes);
         let memory = self.memory.data_mut(&mut self.store);
+        let places = memory[window..].chunks_exact_mut(stride);
         if stride == abi::block::BYTES {
             memory[window..][..records.len() * stride].copy_from_slice(records.as_flattened());
         } else {
-            for (place, record) in memory[window..].chunks_exact_mut(stride).zip(records) {
-                place[..abi::block::BYTES].copy_from_slice(record);
+            for (index, (place, record)) in places.zip(records).enumerate() {
+                let (own, rest) = place.split_at_mut(abi::block::BYTES);
+                own.copy_from_slice(record);
+                let Some((sight, rest)) = rest.split_at_mut_checked(size_of::<Sight>()) else {
+                    continue;
+                };
+                if let Some(seen) = sights.get(index) {
+                    sight.copy_from_slice(seen);
+                }
+                if let Some(geometry) = geometries.get(index)
+                    && rest.len() >= geometry.len()
+                {
+                    rest[..geometry.len()].copy_from_slice(geometry);
+                }
             }
         }
         let fuel = self.budget.window(records.len());

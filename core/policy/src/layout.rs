@@ -2,10 +2,13 @@
 
 use crate::abi::{self, get_f64, get_u32};
 use crate::error::Refusal;
+use crate::inputs::{Input, InputKind, MAX_PROGRAM_VALUES, MAX_SCRIPT_SIGNALS};
 use crate::parameters::Parameter;
 
 /// Parameters that a module may declare.
 const MAX_PARAMETERS: u32 = 64;
+/// Inputs that a module may declare.
+const MAX_INPUTS: u32 = 32;
 /// Bytes of a name or description.
 const MAX_TEXT: u32 = 2048;
 /// Bytes of a structure in an array.
@@ -30,28 +33,36 @@ pub struct Layout {
     parameters: (usize, usize),
     /// The parameters declared.
     pub declared: Vec<Parameter>,
+    /// Address of the first input, and bytes from one to the next.
+    input_table: (usize, usize),
+    /// What the module wants to see.
+    pub inputs: Vec<Input>,
 }
 
 impl Layout {
-    /// Reads the layout at `address` of `memory`.
-    pub fn read(memory: &[u8], address: u32) -> Result<Self, Refusal> {
+    /// Reads the layout at `address` of `memory` of a module that speaks `version` of the ABI.
+    pub fn read(memory: &[u8], address: u32, version: u32) -> Result<Self, Refusal> {
         let at = |field: usize| -> Result<u32, Refusal> {
             get_u32(memory, address as usize + field)
                 .ok_or_else(|| wrong("it lies outside of the memory"))
         };
+        let (own, block, period) = match version {
+            1 => (abi::layout::BYTES, abi::block::BYTES, abi::period::BYTES),
+            _ => (
+                abi::layout::BYTES_V2,
+                abi::block::BYTES_SMALL,
+                abi::period::BYTES_V2,
+            ),
+        };
         let size = at(abi::layout::SIZE)?;
-        if (size as usize) < abi::layout::BYTES {
+        if (size as usize) < own {
             return Err(wrong(format!(
-                "its size is {size} bytes, version 1 has {}",
-                abi::layout::BYTES
+                "its size is {size} bytes, version {version} has {own}"
             )));
         }
-        let block_bytes = stride(at(abi::layout::BLOCK_BYTES)?, abi::block::BYTES, "a block")?;
-        let period_bytes = stride(
-            at(abi::layout::PERIOD_BYTES)?,
-            abi::period::BYTES,
-            "the period",
-        )?;
+        let stride = |bytes, least, what| stride(bytes, least, what, version);
+        let block_bytes = stride(at(abi::layout::BLOCK_BYTES)?, block, "a block")?;
+        let period_bytes = stride(at(abi::layout::PERIOD_BYTES)?, period, "the period")?;
         if (at(abi::layout::WINDOW_BLOCKS)? as usize) < abi::WINDOW_BLOCKS {
             return Err(wrong(format!(
                 "the window holds fewer than {} blocks",
@@ -65,7 +76,12 @@ impl Layout {
             )));
         }
         let place = |address: u32, bytes: usize, what| region(memory, address, bytes, what);
-        let table = Table::read(memory, &at)?;
+        let table = Table::read(memory, &at, version)?;
+        let (input_table, inputs) = if version == 1 {
+            ((0, 0), vec![])
+        } else {
+            inputs(memory, &at)?
+        };
         Ok(Self {
             window: place(
                 at(abi::layout::WINDOW)?,
@@ -78,7 +94,14 @@ impl Layout {
             state_bytes: state_bytes as usize,
             parameters: (table.address, table.stride),
             declared: table.parameters,
+            input_table,
+            inputs,
         })
+    }
+
+    /// Address at which input `index` is told its place.
+    pub fn place_of_input(&self, index: usize) -> usize {
+        self.input_table.0 + index * self.input_table.1 + abi::input::PLACE
     }
 
     /// Address of the value of parameter `index`.
@@ -94,7 +117,11 @@ struct Table {
 }
 
 impl Table {
-    fn read(memory: &[u8], at: &impl Fn(usize) -> Result<u32, Refusal>) -> Result<Self, Refusal> {
+    fn read(
+        memory: &[u8],
+        at: &impl Fn(usize) -> Result<u32, Refusal>,
+        version: u32,
+    ) -> Result<Self, Refusal> {
         let count = at(abi::layout::PARAMETER_COUNT)?;
         if count == 0 {
             return Ok(Self {
@@ -112,6 +139,7 @@ impl Table {
             at(abi::layout::PARAMETER_BYTES)?,
             abi::parameter::BYTES,
             "a parameter",
+            version,
         )?;
         let address = at(abi::layout::PARAMETERS)?;
         let start = region(
@@ -144,6 +172,108 @@ impl Table {
     }
 }
 
+/// The inputs that the layout names: address and stride of their table, and each of them.
+fn inputs(
+    memory: &[u8],
+    at: &impl Fn(usize) -> Result<u32, Refusal>,
+) -> Result<((usize, usize), Vec<Input>), Refusal> {
+    let count = at(abi::layout::INPUT_COUNT)?;
+    if count == 0 {
+        return Ok(((0, 0), vec![]));
+    }
+    if count > MAX_INPUTS {
+        return Err(wrong(format!("{count} inputs, {MAX_INPUTS} are allowed")));
+    }
+    let stride = stride(
+        at(abi::layout::INPUT_BYTES)?,
+        abi::input::BYTES,
+        "an input",
+        2,
+    )?;
+    let address = at(abi::layout::INPUTS)?;
+    let start = region(
+        memory,
+        address,
+        stride * count as usize,
+        "the table of inputs",
+    )?;
+    let utf16 = at(abi::layout::TEXT)? == 1;
+    let each = |index: usize| input(memory, start + index * stride, utf16);
+    let inputs = (0..count as usize)
+        .map(each)
+        .collect::<Result<Vec<_>, _>>()?;
+    for (index, input) in inputs.iter().enumerate() {
+        let same = |other: &Input| (other.kind, &other.name) == (input.kind, &input.name);
+        if inputs[..index].iter().any(same) {
+            return Err(wrong(format!("two inputs are called {:?}", input.name)));
+        }
+    }
+    let of = |kind| inputs.iter().filter(|input| input.kind == kind).count();
+    let most = [
+        (InputKind::Program, MAX_PROGRAM_VALUES, "of the program"),
+        (InputKind::Signal, MAX_SCRIPT_SIGNALS, "that are signals"),
+    ];
+    if let Some((kind, most, what)) = most.into_iter().find(|(kind, most, _)| of(*kind) > *most) {
+        return Err(wrong(format!(
+            "{} inputs {what}, {most} are allowed",
+            of(kind)
+        )));
+    }
+    Ok(((start, stride), inputs))
+}
+
+fn input(memory: &[u8], at: usize, utf16: bool) -> Result<Input, Refusal> {
+    let number = |field: usize| {
+        get_u32(memory, at + field).ok_or_else(|| wrong("an input lies outside of the memory"))
+    };
+    let text =
+        |address: usize, bytes: usize| read_text(memory, number(address)?, number(bytes)?, utf16);
+    let name = text(abi::input::NAME, abi::input::NAME_BYTES)?;
+    let kind = match number(abi::input::KIND)? {
+        abi::input::PROGRAM => InputKind::Program,
+        abi::input::SIGNAL => InputKind::Signal,
+        abi::input::AXIS => InputKind::Axis,
+        other => {
+            return Err(wrong(format!(
+                "{name:?} is an input of the kind {other}, which nobody knows"
+            )));
+        }
+    };
+    if !is_name(&name) {
+        return Err(wrong(format!(
+            "{name:?} is no name of an input: letters, digits and _ only"
+        )));
+    }
+    let words = text(abi::input::WORDS, abi::input::WORDS_BYTES)?;
+    let words: Vec<String> = words
+        .split(',')
+        .map(|word| word.trim().to_ascii_lowercase())
+        .filter(|word| !word.is_empty())
+        .collect();
+    if kind != InputKind::Program && !words.is_empty() {
+        return Err(wrong(format!(
+            "{name:?} has words, which only what a program states can have"
+        )));
+    }
+    // The signals of the machine file keep their units as they are written: `force_N`.
+    let name = match kind {
+        InputKind::Signal => name,
+        InputKind::Program | InputKind::Axis => name.to_ascii_lowercase(),
+    };
+    Ok(Input {
+        kind,
+        name,
+        words,
+        is_optional: number(abi::input::OPTIONAL)? != 0,
+    })
+}
+
+/// Whether `name` may name a parameter or an input.
+fn is_name(name: &str) -> bool {
+    let plain = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    !name.is_empty() && name.len() <= 64 && name.chars().all(plain)
+}
+
 fn parameter(memory: &[u8], at: usize, utf16: bool) -> Result<Parameter, Refusal> {
     let outside = || wrong("a parameter lies outside of the memory");
     let number = |field: usize| get_f64(memory, at + field).ok_or_else(outside);
@@ -159,8 +289,7 @@ fn parameter(memory: &[u8], at: usize, utf16: bool) -> Result<Parameter, Refusal
         number(abi::parameter::HIGHEST)?,
     );
     let default = number(abi::parameter::DEFAULT)?;
-    let plain = |c: char| c.is_ascii_alphanumeric() || c == '_';
-    if name.is_empty() || name.len() > 64 || !name.chars().all(plain) {
+    if !is_name(&name) {
         return Err(wrong(format!(
             "{name:?} is no name of a parameter: letters, digits and _ only"
         )));
@@ -203,13 +332,13 @@ fn read_text(memory: &[u8], address: u32, bytes: u32, utf16: bool) -> Result<Str
         .collect())
 }
 
-fn stride(bytes: u32, least: usize, what: &str) -> Result<usize, Refusal> {
+fn stride(bytes: u32, least: usize, what: &str, version: u32) -> Result<usize, Refusal> {
     let fits = (least as u32..=MAX_STRIDE).contains(&bytes) && bytes.is_multiple_of(8);
     if fits {
         Ok(bytes as usize)
     } else {
         Err(wrong(format!(
-            "{what} has {bytes} bytes, version 1 has {least}"
+            "{what} has {bytes} bytes, version {version} has {least}"
         )))
     }
 }

@@ -23,6 +23,8 @@ mod counters;
 mod engine;
 mod error;
 mod facts;
+mod geometry;
+mod inputs;
 #[cfg(feature = "scripts")]
 mod instance;
 mod layout;
@@ -46,6 +48,8 @@ pub use counters::Counters;
 pub use engine::Engine;
 pub use error::{Refusal, Trouble};
 pub use facts::Facts;
+pub use geometry::Geometry;
+pub use inputs::{Input, InputKind, MAX_PROGRAM_VALUES, MAX_SCRIPT_SIGNALS};
 #[cfg(feature = "scripts")]
 pub use instance::Instance;
 pub use parameters::{Parameter, Values};
@@ -53,6 +57,6 @@ pub use period::Period;
 pub use policy::{MAX_STRIKES, Policy};
 #[cfg(feature = "scripts")]
 pub use script::Script;
-pub use window::Record;
+pub use window::{Record, Sight};
 #[cfg(not(feature = "scripts"))]
 pub use without::{Engine, Instance, Script};

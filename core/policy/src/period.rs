@@ -3,6 +3,8 @@
 use tandem_sdk::AxisVector;
 
 use crate::abi::{period as at, put_f64, put_u32};
+use crate::geometry::put_vector;
+use crate::inputs::MAX_SCRIPT_SIGNALS;
 
 /// Means over the fine periods of a rough period. NaN where there is nothing to tell.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,6 +37,18 @@ pub struct Period {
     pub strategy_ratio: f64,
     /// Magnitude of the motor currents, A.
     pub current_a: AxisVector,
+    /// Position commanded at its end, mm or rad.
+    pub position: AxisVector,
+    /// Speed measured, mean, mm/s or rad/s.
+    pub speed: AxisVector,
+    /// Position commanded less measured, mean per axis, mm or rad.
+    pub axis_error: AxisVector,
+    /// Its largest magnitude per axis.
+    pub max_axis_error: AxisVector,
+    /// The signals that the script asked for, in the order of [`crate::Policy::signals`].
+    pub signals: [f64; MAX_SCRIPT_SIGNALS],
+    /// Rate of program time, mean.
+    pub sigma: f64,
 }
 
 impl Default for Period {
@@ -54,15 +68,22 @@ impl Default for Period {
             distance_left_mm: 0.0,
             strategy_ratio: 1.0,
             current_a: AxisVector::ZERO,
+            position: AxisVector::ZERO,
+            speed: AxisVector::ZERO,
+            axis_error: AxisVector::ZERO,
+            max_axis_error: AxisVector::ZERO,
+            signals: [f64::NAN; MAX_SCRIPT_SIGNALS],
+            sigma: 0.0,
         }
     }
 }
 
 impl Period {
-    /// The bytes that cross into the script; `ratio` is what it asked for last.
-    pub(crate) fn bytes(&self, ratio: f64) -> [u8; at::BYTES] {
-        let mut bytes = [0; at::BYTES];
-        put_u32(&mut bytes, at::SIZE, at::BYTES as u32);
+    /// The bytes that cross into the script, as version 2 lays them out; version 1 is their beginning. `ratio` is what it
+    /// asked for last.
+    pub(crate) fn bytes(&self, ratio: f64, version: u32) -> [u8; at::BYTES_V2] {
+        let mut bytes = [0; at::BYTES_V2];
+        put_u32(&mut bytes, at::SIZE, of_version(version) as u32);
         put_u32(&mut bytes, at::LINE, self.line);
         bytes[at::PERIOD..at::PERIOD + 8].copy_from_slice(&self.period.to_le_bytes());
         let numbers = [
@@ -82,9 +103,26 @@ impl Period {
         for (place, number) in numbers {
             put_f64(&mut bytes, place, number);
         }
-        for (axis, current_a) in self.current_a.0.iter().enumerate() {
-            put_f64(&mut bytes, at::CURRENT + 8 * axis, *current_a);
+        put_vector(&mut bytes, at::CURRENT, &self.current_a);
+        if version > 1 {
+            put_vector(&mut bytes, at::POSITION, &self.position);
+            put_vector(&mut bytes, at::SPEED, &self.speed);
+            put_vector(&mut bytes, at::AXIS_ERROR, &self.axis_error);
+            put_vector(&mut bytes, at::MAX_AXIS_ERROR, &self.max_axis_error);
+            for (index, signal) in self.signals.iter().enumerate() {
+                put_f64(&mut bytes, at::SIGNALS + 8 * index, *signal);
+            }
+            put_f64(&mut bytes, at::SIGMA, self.sigma);
         }
         bytes
+    }
+}
+
+/// Bytes of a period in `version` of the ABI.
+pub(crate) fn of_version(version: u32) -> usize {
+    if version == 1 {
+        at::BYTES
+    } else {
+        at::BYTES_V2
     }
 }

@@ -7,10 +7,11 @@ use crate::budget::Budget;
 use crate::counters::Counters;
 use crate::error::{Refusal, Trouble};
 use crate::facts::Facts;
+use crate::inputs::{Input, Places, Sights};
 use crate::notes::Notes;
-use crate::parameters::Values;
-use crate::period::Period;
-use crate::window::{Asks, Window};
+use crate::parameters::{Parameter, Values};
+use crate::period::{Period, of_version};
+use crate::window::{Asks, BlockWindow, Looks};
 use crate::{Instance, Script};
 
 /// Calls that go wrong before a script is not called any more.
@@ -26,8 +27,11 @@ pub struct Policy {
     /// Whether the first script tunes blocks, and whether it answers periods: the bounds are made for that.
     answers: (bool, bool),
     instance: Option<Instance>,
+    /// What there is to see, and where what the script looks at is.
+    sights: Sights,
+    places: Places,
     strikes: u32,
-    window: Window,
+    window: BlockWindow,
     asks: Vec<Asks>,
     tunings: Vec<Tuning>,
     ratio: f64,
@@ -39,7 +43,7 @@ impl Policy {
     /// Starts `script` with the parameters `values` of the machine file. Allocates.
     ///
     /// # Errors
-    /// It does not start, its layout is wrong, or the parameters do not fit.
+    /// It does not start, its layout is wrong, the parameters do not fit, or the machine has not what it looks at.
     pub fn new(
         script: Script,
         values: Values,
@@ -47,7 +51,12 @@ impl Policy {
         bounds: Bounds,
         facts: &Facts,
     ) -> Result<Self, Refusal> {
-        let instance = Instance::new(&script, &budget, &values)?;
+        let mut instance = Instance::new(&script, &budget, &values)?;
+        let sights = Sights::new(facts.axes, &facts.signals, instance.inputs());
+        let places = sights.places(instance.inputs())?;
+        instance.place(&places);
+        let mut window = BlockWindow::new(facts);
+        window.look_at(looks(&script, &instance));
         let answers = (script.tunes_blocks, script.answers_periods);
         Ok(Self {
             script,
@@ -56,14 +65,43 @@ impl Policy {
             bounds: bounds.for_each_answer(answers == (true, true)),
             answers,
             instance: Some(instance),
+            sights,
+            places,
             strikes: 0,
-            window: Window::new(facts),
+            window,
             asks: Vec::with_capacity(crate::abi::WINDOW_BLOCKS),
             tunings: Vec::with_capacity(crate::abi::WINDOW_BLOCKS),
             ratio: 1.0,
             notes: Notes::new(facts.rough_period_s),
             counters: Counters::default(),
         })
+    }
+
+    /// The parameters that the script declares; none once it is in quarantine. Allocates.
+    pub fn declared(&self) -> Vec<Parameter> {
+        let instance = self.instance.as_ref();
+        instance.map_or(vec![], |instance| instance.parameters().to_vec())
+    }
+
+    /// What the script looks for in the part program: each is stated by [`Self::state`] where the program states it.
+    pub fn program_inputs(&self) -> &[Input] {
+        &self.sights.program
+    }
+
+    /// Which signals the script sees, as indices of [`Facts::signals`], in the order of [`Period::signals`].
+    pub fn signals(&self) -> &[usize] {
+        &self.places.signals
+    }
+
+    /// Whether the script is told more than version 1 of the ABI tells.
+    pub fn looks_closer(&self) -> bool {
+        self.script.version > 1
+    }
+
+    /// The program states `value` for [`Self::program_inputs`] number `which`: it holds for the blocks offered from here on. NaN
+    /// where it states what is no number and no word.
+    pub fn state(&mut self, which: usize, value: f64) {
+        self.window.state(which, value);
     }
 
     /// Takes the next block of the window, at most 64 of them. The first one after [`Self::decide`] begins a new window.
@@ -135,7 +173,8 @@ impl Policy {
     /// any. Strikes and quarantine are forgotten. Not to be called between [`Self::offer`] and [`Self::decide`].
     ///
     /// # Errors
-    /// The new script gives an answer that the first did not give, or does not take over the state: the old one goes on.
+    /// The new script gives an answer that the first did not give, looks at what is not there, or does not take over the
+    /// state: the old one goes on.
     pub fn swap(&mut self, script: Script, mut instance: Instance) -> Result<(), Refusal> {
         let (tunes_blocks, answers_periods) = self.answers;
         let calls = [
@@ -148,6 +187,8 @@ impl Policy {
                 "it exports {call}, which the script that the run began with did not: that takes a new run"
             )]));
         }
+        let places = self.sights.places(instance.inputs())?;
+        instance.place(&places);
         if let Some(old) = &mut self.instance
             && script.keeps_state
         {
@@ -155,6 +196,8 @@ impl Policy {
             let state = old.save().unwrap_or_default();
             instance.restore(&state).map_err(Refusal::Restore)?;
         }
+        self.window.look_at(looks(&script, &instance));
+        self.places = places;
         (self.script, self.instance, self.strikes) = (script, Some(instance), 0);
         self.counters.reloads += 1;
         self.notes
@@ -206,8 +249,9 @@ impl Policy {
             self.counters.windows + 1,
             self.counters.blocks + self.window.blocks().len() as u64,
         );
-        let asked = instance.blocks(self.window.records(), &mut self.asks);
-        self.counters.most_window_fuel = self.counters.most_window_fuel.max(instance.fuel_used);
+        let (sights, geometries) = self.window.sights();
+        let asked = instance.blocks(self.window.records(), sights, geometries, &mut self.asks);
+        self.counters.max_window_fuel = self.counters.max_window_fuel.max(instance.fuel_used);
         let line = self.window.blocks().first().map_or(0, |block| block.line);
         self.settle(instance, asked, "on_blocks", line)
     }
@@ -215,8 +259,10 @@ impl Policy {
     fn ask_period(&mut self, period: &Period) -> Option<f64> {
         let mut instance = self.live()?;
         self.counters.periods += 1;
-        let asked = instance.period(&period.bytes(self.ratio));
-        self.counters.most_period_fuel = self.counters.most_period_fuel.max(instance.fuel_used);
+        let version = self.script.version;
+        let record = period.bytes(self.ratio, version);
+        let asked = instance.period(&record[..of_version(version)]);
+        self.counters.max_period_fuel = self.counters.max_period_fuel.max(instance.fuel_used);
         self.settle(instance, asked, "on_period", period.line)
     }
 
@@ -224,7 +270,10 @@ impl Policy {
     fn live(&mut self) -> Option<Instance> {
         while self.instance.is_none() && !self.is_quarantined() {
             match Instance::new(&self.script, &self.budget, &self.values) {
-                Ok(instance) => self.instance = Some(instance),
+                Ok(mut instance) => {
+                    instance.place(&self.places);
+                    self.instance = Some(instance);
+                }
                 Err(refusal) => self.strike(&Trouble::Trap(refusal.to_string()), "start", 0),
             }
         }
@@ -263,6 +312,15 @@ impl Policy {
         self.notes.always(format!(
             "policy: line {line}: {call}: {trouble}; strike {strikes} of {MAX_STRIKES}, {then}"
         ));
+    }
+}
+
+/// What `script`, started as `instance`, looks at.
+fn looks(script: &Script, instance: &Instance) -> Looks {
+    let sight = script.version > 1;
+    Looks {
+        sight,
+        geometry: sight && instance.sees_geometry(),
     }
 }
 

@@ -9,6 +9,8 @@ use crate::error::Refusal;
 #[derive(Clone)]
 pub struct Script {
     pub(crate) module: Module,
+    /// The version of the ABI that it speaks.
+    pub version: u32,
     /// Whether it tunes blocks.
     pub tunes_blocks: bool,
     /// Whether it answers rough periods.
@@ -33,11 +35,14 @@ impl Script {
         if !imports.is_empty() {
             return Err(Refusal::Imports(imports));
         }
-        check_version(&module)?;
+        let version = version(&module)?;
         let mut wrong = vec![];
         let mut has = |name, wanted: &Wanted| look(&module, name, wanted, &mut wrong);
         has(abi::MEMORY_EXPORT, &Wanted::Memory);
-        has(abi::LAYOUT_EXPORT, &Wanted::Function(&[], &[Number::I32]));
+        has(
+            layout_export(version),
+            &Wanted::Function(&[], &[Number::I32]),
+        );
         let tunes_blocks = has(
             abi::BLOCKS_EXPORT,
             &Wanted::Optional(&[Number::I32, Number::I32], &[]),
@@ -59,6 +64,7 @@ impl Script {
         if wrong.is_empty() {
             Ok(Self {
                 module,
+                version,
                 tunes_blocks,
                 answers_periods,
                 keeps_state: saves,
@@ -145,16 +151,26 @@ fn signature(takes: &[Number], gives: &[Number]) -> String {
     }
 }
 
-/// A module that names another version says so before anything else is looked at.
-fn check_version(module: &Module) -> Result<(), Refusal> {
-    if module.get_export(abi::LAYOUT_EXPORT).is_some() {
-        return Ok(());
+/// Name of the export of the layout in `version`.
+pub(crate) fn layout_export(version: u32) -> &'static str {
+    abi::LAYOUT_EXPORTS[version as usize - 1]
+}
+
+/// The version that the module speaks, the latest where it has several. One that names another version says so before
+/// anything else is looked at.
+fn version(module: &Module) -> Result<u32, Refusal> {
+    let spoken = (1..=abi::VERSION)
+        .rev()
+        .find(|version| module.get_export(layout_export(*version)).is_some());
+    if let Some(version) = spoken {
+        return Ok(version);
     }
     let other = module
         .exports()
         .find_map(|e| e.name().strip_prefix(abi::LAYOUT_PREFIX).map(str::to_owned));
     match other {
         Some(version) => Err(Refusal::OtherVersion(version.chars().take(12).collect())),
-        None => Ok(()),
+        // What it lacks is told with what else it lacks.
+        None => Ok(abi::VERSION),
     }
 }

@@ -5,7 +5,7 @@ use tandem_motion::nurbs::Nurbs;
 use tandem_sdk::{Axes, AxisVector, Block, BlockKind, Curve, MAX_AXES};
 
 /// Places on a curve at which its curvature is looked at.
-const CURVATURE_PLACES: usize = 16;
+pub const CURVATURE_PLACES: usize = 16;
 
 /// A direction over the linear axes, of unit length.
 pub type Direction = [f64; MAX_AXES];

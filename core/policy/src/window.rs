@@ -5,20 +5,51 @@ use tandem_sdk::{Block, BlockKind, Curve, Edge};
 use crate::abi::{self, block as at, put_f64, put_u32};
 use crate::bounds::InForce;
 use crate::facts::Facts;
+use crate::geometry::{Geometry, geometry};
+use crate::inputs::MAX_PROGRAM_VALUES;
 use crate::shape::{Direction, HalfTurn, LinearAxes, Shape, half_turn, turns_rad};
 
 /// One block as it crosses into the script, laid out as [`abi::block`] says.
 pub type Record = [u8; at::BYTES];
+
+/// What version 2 appends to it for every script: diameter of the tool, values of the program.
+pub type Sight = [u8; at::BYTES_SMALL - at::BYTES];
+
+/// How much of a block a script looks at.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Looks {
+    /// Version 2 of the ABI.
+    pub sight: bool,
+    /// Its geometry too.
+    pub geometry: bool,
+}
+
+impl Looks {
+    /// Bytes of a block that are told.
+    fn bytes(self) -> usize {
+        match (self.sight, self.geometry) {
+            (false, _) => at::BYTES,
+            (true, false) => at::BYTES_SMALL,
+            (true, true) => at::BYTES_V2,
+        }
+    }
+}
 
 /// What a script asks for a block: time constant, path tolerance, feed cap; NaN where it leaves them.
 pub type Asks = [f64; 3];
 
 /// The blocks of a window as they cross into the script.
 #[derive(Debug)]
-pub struct Window {
+pub struct BlockWindow {
     facts: Facts,
     axes: LinearAxes,
+    looks: Looks,
     records: Vec<Record>,
+    /// One a record, where the script looks at it.
+    sights: Vec<Sight>,
+    geometries: Vec<Geometry>,
+    /// What the program has stated last.
+    program: [f64; MAX_PROGRAM_VALUES],
     blocks: Vec<InForce>,
     /// The turn into each block, and behind the last.
     half_turns: Vec<HalfTurn>,
@@ -28,14 +59,18 @@ pub struct Window {
     last: Option<Direction>,
 }
 
-impl Window {
+impl BlockWindow {
     /// An empty window.
     pub fn new(facts: &Facts) -> Self {
         let most = abi::WINDOW_BLOCKS;
         Self {
-            facts: *facts,
+            facts: facts.clone(),
             axes: LinearAxes::of(&facts.axes),
+            looks: Looks::default(),
             records: Vec::with_capacity(most),
+            sights: Vec::with_capacity(most),
+            geometries: Vec::with_capacity(most),
+            program: [f64::NAN; MAX_PROGRAM_VALUES],
             blocks: Vec::with_capacity(most),
             half_turns: Vec::with_capacity(most + 1),
             turns_rad: Vec::with_capacity(most + 1),
@@ -46,6 +81,23 @@ impl Window {
     /// The records, one after the other.
     pub fn records(&self) -> &[Record] {
         &self.records
+    }
+
+    /// What a script of version 2 gets of each block beyond its record; none where it looks at less.
+    pub fn sights(&self) -> (&[Sight], &[Geometry]) {
+        (&self.sights, &self.geometries)
+    }
+
+    /// From the next window on the script looks at `looks`.
+    pub fn look_at(&mut self, looks: Looks) {
+        self.looks = looks;
+    }
+
+    /// The program states `value` for input `which`, for all blocks that follow.
+    pub fn state(&mut self, which: usize, value: f64) {
+        if let Some(slot) = self.program.get_mut(which) {
+            *slot = value;
+        }
     }
 
     /// What is in force for each block.
@@ -60,9 +112,34 @@ impl Window {
             .push(half_turn(self.last.as_ref(), shape.start.as_ref()));
         self.last = shape.end;
         let in_force = in_force(block, &self.facts);
-        self.records
-            .push(record(block, &in_force, shape.curvature_per_mm));
+        self.records.push(record(
+            block,
+            &in_force,
+            shape.curvature_per_mm,
+            self.looks.bytes(),
+        ));
         self.blocks.push(in_force);
+        if self.looks.sight {
+            self.sights.push(self.sight(block));
+        }
+        if self.looks.geometry {
+            self.geometries
+                .push(geometry(block, curve, &self.facts.axes));
+        }
+    }
+
+    fn sight(&self, block: &Block) -> Sight {
+        let tools = &self.facts.tool_diameters_mm;
+        let diameter_mm = tools
+            .iter()
+            .find(|(number, _)| *number == block.tool)
+            .map_or(f64::NAN, |(_, diameter_mm)| *diameter_mm);
+        let mut sight = [0; size_of::<Sight>()];
+        put_f64(&mut sight, at::TOOL_DIAMETER - at::BYTES, diameter_mm);
+        for (index, value) in self.program.iter().enumerate() {
+            put_f64(&mut sight, at::PROGRAM - at::BYTES + 8 * index, *value);
+        }
+        sight
     }
 
     /// The block behind the window, in the same stretch; without one the machine rests there. Sets the turns.
@@ -83,6 +160,8 @@ impl Window {
     /// Forgets the blocks.
     pub fn clear(&mut self) {
         self.records.clear();
+        self.sights.clear();
+        self.geometries.clear();
         self.blocks.clear();
         self.half_turns.clear();
     }
@@ -105,7 +184,8 @@ fn in_force(block: &Block, facts: &Facts) -> InForce {
     }
 }
 
-fn record(block: &Block, in_force: &InForce, curvature_per_mm: f64) -> Record {
+/// The record of a block of which `bytes` are told.
+fn record(block: &Block, in_force: &InForce, curvature_per_mm: f64, bytes: usize) -> Record {
     let starts = if block.starts_at_rest() {
         at::STARTS_AT_REST
     } else {
@@ -117,7 +197,7 @@ fn record(block: &Block, in_force: &InForce, curvature_per_mm: f64) -> Record {
         0
     };
     let mut record = [0; at::BYTES];
-    put_u32(&mut record, at::SIZE, at::BYTES as u32);
+    put_u32(&mut record, at::SIZE, bytes as u32);
     put_u32(&mut record, at::LINE, block.line);
     put_u32(&mut record, at::KIND, block.kind as u32);
     put_u32(&mut record, at::TOOL, block.tool);
@@ -148,12 +228,9 @@ mod tests {
     use tandem_sdk::{ArcGeometry, Axes, AxisVector};
 
     fn facts() -> Facts {
-        let axes = Axes::new(&[('X', false), ('Y', false), ('A', true)]).unwrap();
         Facts {
-            axes,
-            time_constant_s: 0.05,
-            path_tolerance_mm: 0.01,
-            rough_period_s: 0.008,
+            axes: Axes::new(&[('X', false), ('Y', false), ('A', true)]).unwrap(),
+            ..Facts::default()
         }
     }
 
@@ -169,13 +246,13 @@ mod tests {
         }
     }
 
-    fn field(window: &Window, index: usize, field: usize) -> f64 {
+    fn field(window: &BlockWindow, index: usize, field: usize) -> f64 {
         get_f64(&window.records()[index], field).unwrap()
     }
 
     #[test]
     fn turns_are_known_at_both_ends_and_across_windows() {
-        let mut window = Window::new(&facts());
+        let mut window = BlockWindow::new(&facts());
         window.push(&line([0.0, 0.0], [1.0, 0.0]), None);
         window.push(&line([1.0, 0.0], [1.0, 1.0]), None);
         window.close(Some((&line([1.0, 1.0], [1.0, 0.0]), None)));
@@ -210,7 +287,7 @@ mod tests {
 
     #[test]
     fn an_arc_has_the_curvature_of_its_circle_and_turns_by_its_tangents() {
-        let mut window = Window::new(&facts());
+        let mut window = BlockWindow::new(&facts());
         window.push(&line([0.0, -2.0], [2.0, -2.0]), None);
         let arc = ArcGeometry {
             plane: [0, 1],

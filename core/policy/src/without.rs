@@ -4,8 +4,10 @@ use std::convert::Infallible;
 
 use crate::budget::Budget;
 use crate::error::{Refusal, Trouble};
+use crate::geometry::Geometry;
+use crate::inputs::{Input, Places};
 use crate::parameters::Parameter;
-use crate::window::{Asks, Record};
+use crate::window::{Asks, Record, Sight};
 
 /// A compiler of policy scripts, which this build does not have.
 #[derive(Clone)]
@@ -33,6 +35,8 @@ impl Engine {
 #[derive(Clone)]
 pub struct Script {
     none: Infallible,
+    /// The version of the ABI that it speaks.
+    pub version: u32,
     /// Whether it tunes blocks.
     pub tunes_blocks: bool,
     /// Whether it answers rough periods.
@@ -73,6 +77,21 @@ impl Instance {
         match self.none {}
     }
 
+    /// What the script wants to see.
+    pub fn inputs(&self) -> &[Input] {
+        match self.none {}
+    }
+
+    /// Tells the script where its inputs are.
+    pub fn place(&mut self, _places: &Places) {
+        match self.none {}
+    }
+
+    /// Whether it looks at the geometry of blocks.
+    pub fn sees_geometry(&self) -> bool {
+        match self.none {}
+    }
+
     /// Pages of memory in use.
     pub fn memory_pages(&self) -> u64 {
         match self.none {}
@@ -82,7 +101,13 @@ impl Instance {
     ///
     /// # Errors
     /// None: there is no instance that could be called, as in all that follow.
-    pub fn blocks(&mut self, _records: &[Record], _asks: &mut Vec<Asks>) -> Result<(), Trouble> {
+    pub fn blocks(
+        &mut self,
+        _records: &[Record],
+        _sights: &[Sight],
+        _geometries: &[Geometry],
+        _asks: &mut Vec<Asks>,
+    ) -> Result<(), Trouble> {
         match self.none {}
     }
 

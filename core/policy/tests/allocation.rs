@@ -5,7 +5,7 @@ mod counting_allocator;
 
 use counting_allocator::{HeapUse, heap_use_of};
 use tandem_policy::{Bounds, Budget, Engine, Facts, Period, Policy};
-use tandem_sdk::{Axes, AxisVector, Block, BlockKind};
+use tandem_sdk::{AxisVector, Block, BlockKind};
 
 fn policy(name: &str) -> Policy {
     let path = format!(
@@ -16,13 +16,7 @@ fn policy(name: &str) -> Policy {
         .unwrap()
         .compile(&std::fs::read(path).unwrap())
         .unwrap();
-    let axes = Axes::new(&[('X', false), ('Y', false)]).unwrap();
-    let facts = Facts {
-        axes,
-        time_constant_s: 0.05,
-        path_tolerance_mm: 0.01,
-        rough_period_s: 0.008,
-    };
+    let facts = Facts::default();
     Policy::new(script, vec![], Budget::default(), Bounds::default(), &facts).unwrap()
 }
 
@@ -43,11 +37,17 @@ fn line(index: u32) -> Block {
 #[test]
 fn windows_and_periods_allocate_nothing_once_the_notes_are_spent() {
     let (mut corners, mut load) = (policy("corner-time-constant"), policy("load-feed"));
+    let (mut plunge, mut contour) = (policy("gentle-plunge"), policy("keep-contour"));
     let mut round = |period: u64| {
         for index in 0..64 {
             corners.offer(&line(index), None);
+            let mut down = line(index);
+            down.end[2] = -1.0;
+            plunge.offer(&down, None);
         }
         corners.decide(None);
+        plunge.decide(None);
+        assert!(plunge.tuning(1).feed_cap_mm_per_s.is_some());
         assert!(corners.tuning(1).time_constant_s.is_some());
         let torque = Period {
             period,
@@ -57,6 +57,7 @@ fn windows_and_periods_allocate_nothing_once_the_notes_are_spent() {
             ..Period::default()
         };
         assert!(load.period(&torque).is_some());
+        assert!(contour.period(&torque).is_some());
     };
     // The first notes are made at once, later ones a second apart.
     (0..30).for_each(&mut round);

@@ -25,8 +25,8 @@ pub use monitor::Monitor;
 pub use policy_summary::PolicySummary;
 pub use polyline::polyline;
 pub use record::{
-    BlocksCsv, EventsCsv, Output, RecordError, SWITCHED_COLUMNS, TraceCsv, age, flush_outputs,
-    outputs_word, rpm,
+    BlocksCsv, EventsCsv, Output, RecordError, RoughCsv, SWITCHED_COLUMNS, TraceCsv, age,
+    flush_outputs, outputs_word, rpm,
 };
 pub use stops::{Stop, StopWatch};
 pub use summary::{

@@ -42,7 +42,9 @@ pub struct PolicySummary {
     /// Times a new script was refused.
     pub refused_reloads: u64,
     /// Most fuel that a window used.
-    pub most_window_fuel: u64,
+    #[serde(rename = "most_window_fuel")]
+    pub max_window_fuel: u64,
     /// Most fuel that a rough period used.
-    pub most_period_fuel: u64,
+    #[serde(rename = "most_period_fuel")]
+    pub max_period_fuel: u64,
 }

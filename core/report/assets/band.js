@@ -1,41 +1,42 @@
 // Height of a row, px: that of its name.
-const BAND_ROW = 12.5;
+const BAND_ROW = 14;
 
 // What binds where: a row for each, filled where it does.
 class BandPlot extends Plot {
   constructor() {
-    super({ title: "What binds", unit: () => "", curves: [], fixed: [0, about.binding.length] });
-    this.canvas.style.flex = `1 0 ${about.binding.length * BAND_ROW + 9}px`;
+    const rows = about.binding.length;
+    super({
+      title: "What binds", unit: () => "", curves: [], fixed: [0, rows],
+      valueAxis: {
+        splits: () => about.binding.map((_, row) => rows - row - 0.5), values: () => about.binding, grid: { show: false },
+      },
+    });
+    this.place.style.flex = `1 0 ${rows * BAND_ROW + 12}px`;
     this.root.style.flexBasis = "auto";
     this.shares = element("i", "note");
     this.root.firstChild.append(this.shares);
   }
 
-  drawGrid({ context, left, top, width, bottom, x }) {
-    const tall = (bottom - top) / about.binding.length;
-    context.textAlign = "right";
-    context.textBaseline = "middle";
-    context.lineWidth = 1;
-    context.strokeStyle = theme.css.grid;
-    for (const t of timeTicks(width)) line(context, Math.round(x(t)) + 0.5, top, Math.round(x(t)) + 0.5, bottom);
-    about.binding.forEach((name, row) => {
-      const y = top + row * tall;
-      context.fillStyle = theme.css.soft;
-      context.fillText(name, left - 6, y + tall / 2, left - 8);
-      if (row > 0) line(context, left, Math.round(y) + 0.5, left + width, Math.round(y) + 0.5);
-      this.drawRow(this.frame, 1 << row, y + 1.5, tall - 3);
+  drawGround(u) {
+    const { ctx, bbox } = u, tall = bbox.height / about.binding.length;
+    about.binding.forEach((_, row) => {
+      const y = bbox.top + row * tall;
+      ctx.strokeStyle = colour("grid");
+      ctx.lineWidth = 1;
+      if (row > 0) line(ctx, bbox.left, Math.round(y) + 0.5, bbox.left + bbox.width, Math.round(y) + 0.5);
+      this.drawRow(u, 1 << row, y + 1.5 * uPlot.pxRatio, tall - 3 * uPlot.pxRatio);
     });
     this.tellShares();
   }
 
-  drawRow({ context, left, width, x, time }, bit, y, tall) {
-    const marks = columns.binding, end = columns.t.length;
-    context.fillStyle = main();
+  drawRow(u, bit, y, tall) {
+    const marks = columns.binding, end = columns.t.length, { left, width } = u.bbox;
+    u.ctx.fillStyle = main();
     for (let px = 0, i = indexAt(state.from); px < width && i < end; px++) {
-      const next = Math.max(indexAt(time(px + 1)), i);
+      const next = Math.max(indexAt(u.posToVal(left + px + 1, "x", true)), i);
       let binds = 0;
       for (let k = i; k < Math.max(next, i + 1) && k < end; k++) binds |= marks[k] & bit;
-      if (binds) context.fillRect(left + px, y, 1, tall);
+      if (binds) u.ctx.fillRect(left + px, y, 1, tall);
       i = next;
     }
   }

@@ -1,107 +1,96 @@
-// One curve of a plot: a column, how it is shown, and where it is too large.
+// One curve of a plot: a column, how it is shown, and where it is too large. What of it is drawn is made here, since a run has
+// millions of samples: of each column of pixels the extremes, which are summed up once.
 class Curve {
-  // look: { key, label, colour(), scale(), limit, twoSided, bit, judged, least: changes that are only rounding }
+  // look: { key, label, colour(), limit, isTwoSided, bit, judged, range(): the samples that are shown }
   constructor(values, marks, look) {
-    Object.assign(this, { scale: () => 1, limit: null, least: 1e-9, twoSided: true, judged: true }, look);
+    Object.assign(this, { limit: null, isTwoSided: true, judged: true, range: selectedRange }, look);
     this.values = values;
     this.extremes = new Extremes(values);
     this.hits = marks ? hitsOf(marks, this.bit) : [];
+    this.paths = (u) => this.path(u);
   }
 
-  get visible() {
+  isShown() {
     return !state.hidden.has(this.key);
   }
 
-  // [low, high] as shown, within the selected time and one sample around it.
-  range() {
-    const [from, to] = selectedRange();
-    return this.extremes.of(from, to).map((v) => v * this.scale());
+  // [low, high] within the selected time and one sample around it.
+  extent() {
+    return this.extremes.of(...this.range());
   }
 
-  // Draws into a frame { context, x(t), y(value), width, left }.
-  draw(frame) {
-    const { context } = frame;
-    context.strokeStyle = context.fillStyle = this.colour();
-    context.lineWidth = 1.4;
-    context.lineJoin = "round";
-    context.beginPath();
-    const [from, to] = selectedRange();
-    if (to - from > frame.width * 2) this.traceExtremes(frame); else this.traceSamples(frame, from, to);
-    context.stroke();
-    if (to - from < frame.width / 7) this.drawDots(frame, from, to);
+  path(u) {
+    const path = new Path2D(), [from, to] = this.range();
+    if (to - from > 2 * u.bbox.width / uPlot.pxRatio) this.traceExtremes(u, path); else this.traceSamples(u, path, from, to);
+    return { stroke: path };
   }
 
-  traceSamples(frame, from, to) {
-    let broken = true;
+  traceSamples(u, path, from, to) {
+    let isBroken = true;
     for (let i = from; i < to; i++) {
-      const value = this.values[i] * this.scale();
-      if (isNaN(value)) { broken = true; continue; }
-      const x = frame.x(columns.t[i]), y = frame.y(value);
-      if (broken) frame.context.moveTo(x, y); else frame.context.lineTo(x, y);
-      broken = false;
+      const value = this.values[i];
+      if (isNaN(value)) { isBroken = true; continue; }
+      const x = u.valToPos(columns.t[i], "x", true), y = u.valToPos(value, "y", true);
+      if (isBroken) path.moveTo(x, y); else path.lineTo(x, y);
+      isBroken = false;
     }
   }
 
   // From each column of pixels its smallest and largest value: no peak gets lost between pixels.
-  traceExtremes(frame) {
-    const scale = this.scale();
+  traceExtremes(u, path) {
     let previous = null;
-    for (let px = 0, i = indexAt(state.from); px < frame.width; px++) {
-      const end = indexAt(frame.time(px + 1));
-      const [low, high] = this.extremes.of(i, end), sampled = end > i;
+    for (let px = 0, i = indexAt(u.scales.x.min); px < u.bbox.width; px++) {
+      const end = indexAt(u.posToVal(u.bbox.left + px + 1, "x", true));
+      const [low, high] = this.extremes.of(i, end), isSampled = end > i;
       i = end;
       if (low > high) {
         // Samples without a value are a gap; a column without samples is none.
-        if (sampled) previous = null;
+        if (isSampled) previous = null;
         continue;
       }
-      const x = frame.left + px + 0.5;
-      let ends = [frame.y(low * scale), frame.y(high * scale)];
+      const x = u.bbox.left + px + 0.5;
+      const ends = [u.valToPos(low, "y", true), u.valToPos(high, "y", true)];
       if (previous !== null && Math.abs(previous - ends[1]) < Math.abs(previous - ends[0])) ends.reverse();
-      if (previous === null) frame.context.moveTo(x, ends[0]); else frame.context.lineTo(x, ends[0]);
-      frame.context.lineTo(x, ends[1]);
+      if (previous === null) path.moveTo(x, ends[0]); else path.lineTo(x, ends[0]);
+      path.lineTo(x, ends[1]);
       previous = ends[1];
     }
   }
 
-  drawDots(frame, from, to) {
-    for (let i = from; i < to; i++) dot(frame, frame.x(columns.t[i]), frame.y(this.values[i] * this.scale()), 1.8);
-  }
-
   // What is too much: a band over the whole height, so that one sample in a million is seen, and the value itself.
-  drawHits(frame) {
+  drawHits(u) {
     if (this.hits.length === 0) return;
-    const { context } = frame;
-    context.fillStyle = context.strokeStyle = this.judged ? theme.css.bad : theme.css.warn;
+    const { ctx } = u, { pxRatio } = uPlot;
+    ctx.fillStyle = ctx.strokeStyle = colour(this.judged ? "bad" : "warn");
     let drawn = -Infinity;
     for (let k = lowerBound(this.hits, indexAt(state.from)); k < this.hits.length; k++) {
-      const i = this.hits[k], x = frame.x(columns.t[i]);
+      const i = this.hits[k], x = u.valToPos(columns.t[i], "x", true);
       if (columns.t[i] > state.to) break;
-      if (x - drawn < 1) continue;
-      if (this.judged) drawBand(frame, x, drawn);
-      dot(frame, x, frame.y(this.values[i] * this.scale()), 2.4);
+      if (x - drawn < pxRatio) continue;
+      if (this.judged) drawBand(u, x, drawn);
+      dot(ctx, x, u.valToPos(this.values[i], "y", true), 2.4 * pxRatio);
       drawn = x;
     }
   }
 }
 
-function drawBand(frame, x, drawn) {
-  const { context, top, bottom } = frame;
-  context.globalAlpha = 0.2;
-  context.fillRect(Math.max(x - 1.5, drawn + 1.5), top, Math.min(3, x - drawn), bottom - top);
-  context.globalAlpha = 1;
-  context.beginPath();
-  context.moveTo(x - 3.5, top);
-  context.lineTo(x + 3.5, top);
-  context.lineTo(x, top + 5);
-  context.fill();
+function drawBand({ ctx, bbox }, x, drawn) {
+  const { top, height } = bbox, { pxRatio } = uPlot, half = 1.5 * pxRatio;
+  ctx.globalAlpha = 0.2;
+  ctx.fillRect(Math.max(x - half, drawn + half), top, Math.min(2 * half, x - drawn), height);
+  ctx.globalAlpha = 1;
+  ctx.beginPath();
+  ctx.moveTo(x - 3.5 * pxRatio, top);
+  ctx.lineTo(x + 3.5 * pxRatio, top);
+  ctx.lineTo(x, top + 5 * pxRatio);
+  ctx.fill();
 }
 
-function dot(frame, x, y, radius) {
+function dot(context, x, y, radius) {
   if (isNaN(y)) return;
-  frame.context.beginPath();
-  frame.context.arc(x, y, radius, 0, 2 * Math.PI);
-  frame.context.fill();
+  context.beginPath();
+  context.arc(x, y, radius, 0, 2 * Math.PI);
+  context.fill();
 }
 
 function hitsOf(marks, bit) {

@@ -99,19 +99,19 @@ function makeFindings(view) {
   }
 }
 
-function followTheme() {
-  const reload = () => {
-    loadTheme();
+function listenToTheme() {
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+    followTheme();
     changed("look");
-  };
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", reload);
-  reload();
+  });
 }
 
 function makeDrawings() {
-  const plots = allPlots(), overview = new Overview(byId("overview")), view = new PathView(byId("path"));
+  const plots = allPlots(), overview = new Overview(byId("overview"));
+  const view = new PathView(byId("path-ground"), byId("path-lines"), byId("path"));
   byId("plots").append(...plots.map((plot) => plot.root));
-  on("window cursor look", () => plots.forEach((plot) => plot.draw()));
+  plots.forEach((plot) => plot.begin());
+  on("window cursor look", (kinds) => plots.forEach((plot) => plot.draw(kinds)));
   on("window look", () => overview.draw());
   on("window look", drawTimeAxis);
   on("window cursor look", () => view.draw());
@@ -120,7 +120,6 @@ function makeDrawings() {
 }
 
 async function start() {
-  loadTheme();
   await readColumns();
   if (columns.t.length === 0) {
     document.querySelector("main").replaceChildren(element("p", "", "This run has no samples."));
@@ -132,7 +131,7 @@ async function start() {
     makeButtons(view);
     makeFindings(view);
     listenToKeys();
-    followTheme();
+    listenToTheme();
     addEventListener("resize", () => changed("look"));
     addEventListener("hashchange", restoreTime);
     redraw();

@@ -1,8 +1,6 @@
-// The views: which directions of space point right and up on the screen.
-const PLANES = { XY: [[1, 0, 0], [0, 1, 0]], XZ: [[1, 0, 0], [0, 0, 1]], YZ: [[0, 1, 0], [0, 0, 1]] };
-
-// Points drawn while the picture moves; when it rests, all that differ on the screen are.
-const DRAFT_POINTS = 40000;
+// The path as it was driven, coloured by a quantity; what lies outside of the selected time is faint.
+const FAINT = SHADES;
+const WIDTH = 1.8;
 
 // The axes that span the path: X, Y and Z where the machine has them, else its first ones.
 function spaceAxes() {
@@ -11,14 +9,13 @@ function spaceAxes() {
 }
 
 class PathView {
-  constructor(canvas) {
-    this.canvas = canvas;
+  // Three canvases on each other: the ground, the lines, and what stands above them, which also takes the pointer.
+  constructor(ground, canvas, over) {
+    Object.assign(this, { ground, over, lines: new Lines(canvas), camera: new Camera(), made: "" });
     this.space = spaceAxes();
     this.points = this.space.map((axis) => (axis < 0 ? new Float32Array(columns.t.length) : columns["position" + axis]));
-    this.yaw = -0.6;
-    this.pitch = 0.55;
-    this.centre = [0, 0, 0];
-    this.scale = 1;
+    this.names = this.space.map((axis, place) => (axis < 0 ? "XYZ"[place] : about.axes[axis].letter));
+    this.origin = this.space.map((axis) => (axis < 0 ? 0 : about.axes[axis].centre));
     this.sources = this.colourSources();
     this.source = this.sources[0];
     this.hits = hitsOf(anyMarks(), 255);
@@ -38,122 +35,81 @@ class PathView {
   }
 
   show(name) {
-    this.name = name;
-    this.turn();
+    this.camera.show(name);
     this.fit(0, columns.t.length);
   }
 
-  // Right and up, in mm of space per mm of screen.
-  turn() {
-    if (PLANES[this.name]) { [this.right, this.up] = PLANES[this.name]; return; }
-    const [sy, cy, sp, cp] = [Math.sin(this.yaw), Math.cos(this.yaw), Math.sin(this.pitch), Math.cos(this.pitch)];
-    this.right = [cy, sy, 0];
-    this.up = [-sy * sp, cy * sp, cp];
+  measure() {
+    [this.camera.width, this.camera.height] = [this.over.clientWidth, this.over.clientHeight];
   }
 
   fit(from, to) {
+    this.fitted = [from, to];
     const step = Math.max(1, Math.floor((to - from) / 100000));
-    let u0 = Infinity, u1 = -Infinity, v0 = Infinity, v1 = -Infinity;
+    const ends = { u0: Infinity, u1: -Infinity, v0: Infinity, v1: -Infinity };
+    const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
     for (let i = from; i < to; i += step) {
-      const u = this.along(this.right, i), v = this.along(this.up, i);
-      u0 = Math.min(u0, u); u1 = Math.max(u1, u);
-      v0 = Math.min(v0, v); v1 = Math.max(v1, v);
+      const point = this.points.map((values) => values[i]);
+      this.camera.widen(ends, point);
+      point.forEach((value, axis) => {
+        low[axis] = Math.min(low[axis], value);
+        high[axis] = Math.max(high[axis], value);
+      });
     }
-    if (!(u0 <= u1)) return;
-    const wide = this.canvas.clientWidth - 96, high = this.canvas.clientHeight - 110;
-    this.scale = Math.min(wide / Math.max(u1 - u0, 1e-3), high / Math.max(v1 - v0, 1e-3));
-    this.centre = [(u0 + u1) / 2, (v0 + v1) / 2];
+    this.measure();
+    if (to > from) this.camera.frame(ends, low.map((value, axis) => (value + high[axis]) / 2));
     changed("look");
   }
 
-  along(direction, i) {
-    const [x, y, z] = this.points;
-    return direction[0] * x[i] + direction[1] * y[i] + direction[2] * z[i];
-  }
-
   screen(i) {
-    return [
-      this.width / 2 + (this.along(this.right, i) - this.centre[0]) * this.scale,
-      this.height / 2 - (this.along(this.up, i) - this.centre[1]) * this.scale + 12,
-    ];
+    const [x, y, z] = this.points;
+    return this.camera.screen([x[i], y[i], z[i]]);
   }
 
   draw() {
-    const { context, width, height } = prepare(this.canvas);
-    Object.assign(this, { context, width, height });
+    const { width, height } = this.camera;
+    this.measure();
+    // What is fitted stays so while the view takes its size, as when the page comes up.
+    if (this.fitted && (width !== this.camera.width || height !== this.camera.height)) this.fit(...this.fitted);
     const [from, to] = selectedRange();
     const [low, high] = rangeOf(this.source);
-    if (PLANES[this.name]) this.drawGrid();
-    if (!allTimeSelected()) this.drawRest(from, to);
-    this.drawPath(from, to, low, high);
-    this.drawHits(from, to);
-    this.drawCursor();
-    this.drawLegend(low, high);
-    if (!PLANES[this.name]) this.drawTriad();
-    this.drawScaleBar();
+    const key = [from, to, low, high, this.source.name].join();
+    if (key !== this.made) this.make(from, to, low, high);
+    this.made = key;
+    const ground = prepare(this.ground).context;
+    if (this.camera.isPlane) drawGrid(ground, this.camera, this.names, this.origin);
+    const colours = [...shades().map((shade) => [...shade.map((part) => part / 255), 1]), [...rgba(colour("faint")).slice(0, 3), 0.5]];
+    this.lines.draw(this.camera.view(), colours, WIDTH, this.isMoving);
+    const { context } = prepare(this.over);
+    this.drawHits(context, from, to);
+    if (state.cursor !== null) drawPlace(context, this.screen(state.cursor));
+    this.drawLegend(context, low, high);
+    if (!this.camera.isPlane) drawTriad(context, this.camera, this.names);
+    drawScaleBar(context, this.camera);
   }
 
-  // Calls stroke(x0, y0, x1, y1, value) for what differs by a pixel; the lowest value on the way counts.
-  walk(from, to, stroke) {
-    const [x, y, z] = this.points, [r, u] = [this.right, this.up], k = this.scale;
-    const originX = this.width / 2 - this.centre[0] * k, originY = this.height / 2 + this.centre[1] * k + 12;
-    const step = this.moving ? Math.max(1, Math.floor((to - from) / DRAFT_POINTS)) : 1;
-    const least = this.moving ? 2 : 0.6;
-    let px, py, value = Infinity;
-    for (let i = from; i < to; i += step) {
-      const sx = originX + (r[0] * x[i] + r[1] * y[i] + r[2] * z[i]) * k;
-      const sy = originY - (u[0] * x[i] + u[1] * y[i] + u[2] * z[i]) * k;
-      if (i === from) { px = sx; py = sy; }
-      if (this.source.values[i] < value) value = this.source.values[i];
-      if (Math.abs(sx - px) + Math.abs(sy - py) < least && i + step < to) continue;
-      if (this.isSeen(px, py, sx, sy)) stroke(px, py, sx, sy, value);
-      px = sx; py = sy; value = Infinity;
+  // The lines anew: first what lies outside of the selected time.
+  make(from, to, low, high) {
+    this.lines.clear();
+    const n = columns.t.length;
+    if (from > 0) this.add(0, from + 1, () => FAINT);
+    if (to < n) this.add(to - 1, n, () => FAINT);
+    this.add(from, to, (i) => shadeOf(this.source.values[i], low, high));
+  }
+
+  add(from, to, shade) {
+    const [x, y, z] = this.points, points = new Float32Array(Math.max(to - from, 0) * 4);
+    for (let i = from, at = 0; i < to; i++, at += 4) {
+      points[at] = x[i];
+      points[at + 1] = y[i];
+      points[at + 2] = z[i];
+      points[at + 3] = i === from ? NO_LINE : shade(i);
     }
+    this.lines.add(points);
   }
 
-  isSeen(x0, y0, x1, y1) {
-    return Math.max(x0, x1) > 0 && Math.min(x0, x1) < this.width && Math.max(y0, y1) > 0 && Math.min(y0, y1) < this.height;
-  }
-
-  // One stroke for each shade: a canvas is slow in changing colours, not in drawing lines.
-  drawPath(from, to, low, high) {
-    const shades = Array.from({ length: SHADES }, () => []);
-    this.walk(from, to, (x0, y0, x1, y1, value) => shades[shadeOf(value, low, high)].push(x0, y0, x1, y1));
-    this.context.lineWidth = 1.8;
-    this.context.lineCap = "round";
-    for (let shade = SHADES - 1; shade >= 0; shade--) this.strokeAll(shades[shade], theme.shades[shade]);
-    this.context.lineCap = "butt";
-  }
-
-  strokeAll(lines, colour) {
-    const { context } = this;
-    context.strokeStyle = colour;
-    // A sharp join of lines that nearly turn back would stand out by several line widths.
-    context.lineJoin = "round";
-    context.beginPath();
-    let endX, endY;
-    for (let k = 0; k < lines.length; k += 4) {
-      if (lines[k] !== endX || lines[k + 1] !== endY) context.moveTo(lines[k], lines[k + 1]);
-      context.lineTo(endX = lines[k + 2], endY = lines[k + 3]);
-    }
-    context.stroke();
-  }
-
-  // What lies outside of the selected time.
-  drawRest(from, to) {
-    const lines = [];
-    const add = (x0, y0, x1, y1) => lines.push(x0, y0, x1, y1);
-    this.walk(0, from + 1, add);
-    this.walk(to - 1, columns.t.length, add);
-    this.context.lineWidth = 1;
-    this.context.globalAlpha = 0.55;
-    this.strokeAll(lines, theme.css.faint);
-    this.context.globalAlpha = 1;
-  }
-
-  drawHits(from, to) {
-    const { context } = this;
-    context.strokeStyle = theme.css.bad;
+  drawHits(context, from, to) {
+    context.strokeStyle = colour("bad");
     context.lineWidth = 1.6;
     let last = [-99, -99];
     for (let k = lowerBound(this.hits, from); k < this.hits.length && this.hits[k] < to; k++) {
@@ -166,17 +122,82 @@ class PathView {
     }
   }
 
-  drawCursor() {
-    if (state.cursor === null) return;
-    const [x, y] = this.screen(state.cursor), { context } = this;
-    context.lineWidth = 2;
-    context.strokeStyle = theme.css.card;
-    context.fillStyle = theme.css.ink;
-    context.beginPath();
-    context.arc(x, y, 5, 0, 2 * Math.PI);
-    context.fill();
-    context.stroke();
+  drawLegend(context, low, high) {
+    const left = 12, top = 26, wide = Math.min(220, this.camera.width - 40), scale = this.source.scale();
+    context.fillStyle = colour("card");
+    context.globalAlpha = 0.85;
+    context.fillRect(4, 4, wide + 28, 50);
+    context.globalAlpha = 1;
+    shades().forEach((shade, k) => {
+      context.fillStyle = `rgb(${shade.join()})`;
+      context.fillRect(left + k * wide / SHADES, top, wide / SHADES + 0.5, 8);
+    });
+    context.fillStyle = colour("soft");
+    context.textAlign = "left";
+    context.textBaseline = "top";
+    context.fillText(`${this.source.name}${this.source.unit() ? " in " + this.source.unit() : ""}`, left, 8);
+    context.textAlign = "center";
+    const places = ticks(low * scale, high * scale, 4);
+    tickLabels(places).forEach((label, k) => {
+      context.fillText(label, left + (places[k] / scale - low) / (high - low) * wide, top + 12);
+    });
   }
+
+  listen() {
+    const { over } = this;
+    this.camera.listen(over, () => this.keepMoving());
+    over.addEventListener("dblclick", () => this.fit(0, columns.t.length));
+    over.addEventListener("pointermove", (event) => (event.buttons === 0 ? this.hover(event) : this.leave()));
+    over.addEventListener("pointerleave", () => this.leave());
+  }
+
+  // One pixel wide while it moves, as wide as it is when it rests.
+  keepMoving() {
+    this.fitted = null;
+    this.isMoving = true;
+    clearTimeout(this.resting);
+    this.resting = setTimeout(() => {
+      this.isMoving = false;
+      changed("look");
+    }, 150);
+    changed("look");
+  }
+
+  hover(event) {
+    const box = this.over.getBoundingClientRect();
+    const [x, y] = [event.clientX - box.left, event.clientY - box.top];
+    const nearest = this.nearest(x, y);
+    setCursor(nearest);
+    const tip = document.getElementById("tip");
+    tip.hidden = nearest === null;
+    if (nearest === null) return;
+    tip.textContent = tipText(nearest);
+    tip.style.left = Math.max(4, Math.min(x + 14, this.camera.width - tip.offsetWidth - 6)) + "px";
+    tip.style.top = (y + 16 + tip.offsetHeight > this.camera.height ? y - tip.offsetHeight - 10 : y + 16) + "px";
+  }
+
+  leave() {
+    document.getElementById("tip").hidden = true;
+    setCursor(null);
+  }
+
+  // The sample of the selected time that is nearest on the screen, if it is near at all.
+  nearest(x, y) {
+    const [from, to] = selectedRange();
+    let best = null, least = 30 * 30;
+    for (let i = from; i < to; i++) {
+      const [px, py] = this.screen(i);
+      const square = (px - x) ** 2 + (py - y) ** 2;
+      if (square < least) { least = square; best = i; }
+    }
+    return best;
+  }
+}
+
+function tipText(i) {
+  const places = about.axes.map((axis, k) => `${axis.letter} ${minus(positionOf(k, i).toFixed(4))} ${axis.unit}`);
+  const feed = `${number(columns.feed[i] * feedScale())} ${feedUnit()}`;
+  return [`line ${columns.line[i]}`, `t ${columns.t[i].toFixed(4)} s`, `feed ${feed}`, ...places].join("\n");
 }
 
 // Extremes of a colour source within the selected time, from 0 where it never is negative.

@@ -9,18 +9,18 @@ function feedUnit() {
 }
 
 function main() {
-  return THEMES[theme.name].main;
+  return colour("main");
 }
 
 function second() {
-  return THEMES[theme.name].second;
+  return colour("second");
 }
 
 function feedPlot() {
-  const look = (key, label, colour) => ({ key, label, colour, scale: feedScale });
+  const look = (key, label, colour) => ({ key, label, colour });
   const curves = [new Curve(columns.feed, null, look("feed", "path", main))];
   if (columns.programmed) curves.unshift(new Curve(columns.programmed, null, look("programmed", "programmed", second)));
-  return new Plot({ title: "Feed", unit: feedUnit, curves, fromZero: true, major: true });
+  return new Plot({ title: "Feed", unit: feedUnit, scale: feedScale, curves, fromZero: true, major: true });
 }
 
 // One plot for the linear and one for the rotary axes: their units have nothing in common.
@@ -28,22 +28,21 @@ function axisPlots(title, column, what) {
   return ["mm", "deg"].flatMap((unit) => {
     const curves = about.axes.map((axis, i) => [axis, i]).filter(([axis, i]) => axis.unit === unit && columns[column + i])
       .map(([axis, i]) => axisCurve(axis, i, column, what));
-    return curves.length === 0 ? [] : [new Plot({ title, curves, ...what.plot(unit) })];
+    const least = Math.max(0, ...about.axes.filter((axis) => axis.unit === unit).map((axis) => what.smallest || axis.max_acceleration * (what.least || 1e-9)));
+    return curves.length === 0 ? [] : [new Plot({ title, curves, least, ...what.plot(unit) })];
   });
 }
 
 function axisCurve(axis, i, column, what) {
   return new Curve(columns[column + i], columns["marks" + i], {
     key: "axis " + axis.letter, label: axis.letter, colour: () => axisColour(axis.letter), bit: what.bit,
-    limit: what.limit ? axis[what.limit] : null, scale: what.scale ? what.scale(axis) : () => 1, judged: what.judged !== false,
-    least: what.smallest || axis.max_acceleration * (what.least || 1e-9),
+    limit: what.limit ? axis[what.limit] : null, judged: what.judged !== false,
   });
 }
 
 function velocityPlots() {
-  const scale = (axis) => (axis.linear ? feedScale : () => 1);
-  const plot = (unit) => ({ unit: () => (unit === "mm" ? feedUnit() : "deg/s"), major: true });
-  return axisPlots("Velocity", "velocity", { bit: 1, limit: "max_velocity", scale, plot });
+  const plot = (unit) => ({ unit: () => (unit === "mm" ? feedUnit() : "deg/s"), scale: unit === "mm" ? feedScale : () => 1, major: true });
+  return axisPlots("Velocity", "velocity", { bit: 1, limit: "max_velocity", plot });
 }
 
 function accelerationPlots() {
@@ -66,15 +65,15 @@ function jerkPlots() {
 function deviationPlot() {
   if (!columns.deviation) return [];
   const curve = new Curve(columns.deviation, columns.offpath, {
-    key: "deviation", label: "deviation", colour: main, scale: () => 1000, limit: about.path_tolerance_mm, twoSided: false, bit: 1,
+    key: "deviation", label: "deviation", colour: main, limit: about.path_tolerance_mm, isTwoSided: false, bit: 1,
   });
-  return [new Plot({ title: "Path deviation", unit: () => "µm", curves: [curve], fromZero: true })];
+  return [new Plot({ title: "Path deviation", unit: () => "µm", scale: () => 1000, curves: [curve], fromZero: true })];
 }
 
 function followingPlots() {
-  const scale = (axis) => (axis.linear ? () => 1000 : () => 1);
   // Below a hundredth of a µm or of a degree there is nothing to see.
-  return axisPlots("Following error", "following", { scale, bit: 0, smallest: 1e-2, plot: (unit) => ({ unit: () => (unit === "mm" ? "µm" : "deg") }) });
+  const plot = (unit) => (unit === "mm" ? { unit: () => "µm", scale: () => 1000, least: 1e-5 } : { unit: () => "deg", least: 1e-2 });
+  return axisPlots("Following error", "following", { bit: 0, plot });
 }
 
 function sigmaPlot() {

@@ -85,16 +85,3 @@ function restoreTime() {
   const [from, to] = (wanted || "").split(",").map(Number);
   if (to > from) selectTime(from, to); else selectAllTime();
 }
-
-// A canvas in device pixels with a context in CSS pixels.
-function prepare(canvas) {
-  const ratio = window.devicePixelRatio || 1;
-  const width = canvas.clientWidth, height = canvas.clientHeight;
-  const wide = Math.round(width * ratio), high = Math.round(height * ratio);
-  if (canvas.width !== wide || canvas.height !== high) Object.assign(canvas, { width: wide, height: high });
-  const context = canvas.getContext("2d");
-  context.setTransform(ratio, 0, 0, ratio, 0, 0);
-  context.clearRect(0, 0, width, height);
-  context.font = "11px system-ui, 'Segoe UI', Roboto, 'Liberation Sans', Arial, sans-serif";
-  return { context, width, height };
-}

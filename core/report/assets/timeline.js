@@ -3,33 +3,33 @@
 // The stretch being dragged over a plot: { from, to } in s.
 let dragged = null;
 
-function timeUnder(event, canvas) {
-  const width = canvas.clientWidth - GUTTER.left - GUTTER.right;
-  const part = (event.clientX - canvas.getBoundingClientRect().left - GUTTER.left) / width;
+function timeUnder(event, over) {
+  const box = over.getBoundingClientRect();
+  const part = (event.clientX - box.left) / box.width;
   return state.from + Math.min(Math.max(part, 0), 1) * (state.to - state.from);
 }
 
-function listenToTime(canvas) {
-  canvas.addEventListener("wheel", (event) => wheelTime(event, canvas), { passive: false });
-  canvas.addEventListener("dblclick", selectAllTime);
-  canvas.addEventListener("pointerdown", (event) => dragTime(event, canvas));
-  canvas.addEventListener("pointerleave", () => setCursor(null));
-  canvas.addEventListener("pointermove", (event) => setCursor(nearestIndex(timeUnder(event, canvas))));
+function listenToTime(over) {
+  over.addEventListener("wheel", (event) => wheelTime(event, over), { passive: false });
+  over.addEventListener("dblclick", selectAllTime);
+  over.addEventListener("pointerdown", (event) => dragTime(event, over));
+  over.addEventListener("pointerleave", () => setCursor(null));
+  over.addEventListener("pointermove", (event) => setCursor(nearestIndex(timeUnder(event, over))));
 }
 
-function wheelTime(event, canvas) {
+function wheelTime(event, over) {
   event.preventDefault();
   const sideways = event.shiftKey || Math.abs(event.deltaX) > Math.abs(event.deltaY);
   const amount = event.deltaY || event.deltaX;
   if (sideways) moveTime((event.deltaX || event.deltaY) / 1000 * (state.to - state.from));
-  else zoomTime(timeUnder(event, canvas), Math.exp(amount * 0.0015));
+  else zoomTime(timeUnder(event, over), Math.exp(amount * 0.0015));
 }
 
-function dragTime(event, canvas) {
-  const start = timeUnder(event, canvas), startX = event.clientX;
+function dragTime(event, over) {
+  const start = timeUnder(event, over), startX = event.clientX;
   const moving = event.shiftKey || event.button !== 0;
-  drag(event, canvas, (move) => {
-    const t = timeUnder(move, canvas);
+  drag(event, over, (move) => {
+    const t = timeUnder(move, over);
     if (moving) return moveTime(start - t);
     dragged = Math.abs(move.clientX - startX) < 4 ? null : { from: Math.min(start, t), to: Math.max(start, t) };
     changed("look");
@@ -64,12 +64,16 @@ function listenToKeys() {
   });
 }
 
+function timeTicks(width) {
+  return ticks(state.from, state.to, width / 90);
+}
+
 function drawTimeAxis() {
   const { context, width } = prepare(document.getElementById("time-axis"));
   const inner = width - GUTTER.left - GUTTER.right;
   const places = timeTicks(inner);
-  context.fillStyle = theme.css.soft;
-  context.strokeStyle = theme.css.line;
+  context.fillStyle = colour("soft");
+  context.strokeStyle = colour("line");
   context.textBaseline = "top";
   context.textAlign = "center";
   tickLabels(places).forEach((label, k) => {
@@ -84,55 +88,43 @@ function drawTimeAxis() {
 
 // The whole run in one strip: its feed, and the selected time as a window that can be dragged.
 class Overview {
-  constructor(canvas) {
-    this.canvas = canvas;
-    this.feed = new Extremes(columns.feed);
-    canvas.addEventListener("pointerdown", (event) => this.dragWindow(event));
-    canvas.addEventListener("wheel", (event) => wheelTime(event, canvas), { passive: false });
-    canvas.addEventListener("dblclick", selectAllTime);
-  }
-
-  get perPixel() {
-    return (lastTime() - firstTime()) / (this.canvas.clientWidth - GUTTER.left - GUTTER.right);
+  constructor(place) {
+    const feed = new Curve(columns.feed, null, { key: "whole run", label: "feed", colour: () => colour("faint"), range: () => [0, columns.t.length] });
+    this.u = timePlot(place, {
+      label: "overview of the run", times: columns.t, curves: [feed], fromZero: true,
+      valueAxis: { splits: (u, _, low, high) => [(low + high) / 2], values: () => ["whole run"], grid: { show: false } },
+      hooks: { draw: [(u) => this.drawWindow(u)] },
+    });
+    const { over } = this.u;
+    over.addEventListener("pointerdown", (event) => this.dragWindow(event));
+    over.addEventListener("wheel", (event) => wheelTime(event, over), { passive: false });
+    over.addEventListener("dblclick", selectAllTime);
+    new ResizeObserver(() => this.u.setSize({ width: place.clientWidth, height: place.clientHeight })).observe(place);
+    this.u.setScale("x", { min: firstTime(), max: lastTime() });
   }
 
   dragWindow(event) {
-    const box = this.canvas.getBoundingClientRect();
-    const t = firstTime() + (event.clientX - box.left - GUTTER.left) * this.perPixel;
+    const { over } = this.u, box = over.getBoundingClientRect(), perPixel = (lastTime() - firstTime()) / box.width;
+    const t = firstTime() + (event.clientX - box.left) * perPixel;
     if (t < state.from || t > state.to) moveTime(t - (state.from + state.to) / 2);
     let last = event.clientX;
-    drag(event, this.canvas, (move) => {
-      moveTime((move.clientX - last) * this.perPixel);
+    drag(event, over, (move) => {
+      moveTime((move.clientX - last) * perPixel);
       last = move.clientX;
     });
   }
 
   draw() {
-    const { context, width, height } = prepare(this.canvas);
-    const left = GUTTER.left, inner = width - left - GUTTER.right;
-    const top = this.feed.of(0, columns.t.length)[1] || 1;
-    context.fillStyle = theme.css.faint;
-    for (let px = 0, i = 0; px < inner; px++) {
-      const end = indexAt(firstTime() + (px + 1) * this.perPixel);
-      const high = this.feed.of(i, Math.max(end, i + 1))[1];
-      i = end;
-      const tall = Math.max(high, 0) / top * (height - 8);
-      if (tall > 0) context.fillRect(left + px, height - 3 - tall, 1, tall);
-    }
-    context.fillStyle = theme.css.soft;
-    context.textAlign = "right";
-    context.textBaseline = "middle";
-    context.fillText("whole run", left - 6, height / 2);
-    this.drawWindow(context, height);
+    this.u.redraw(false, true);
   }
 
-  drawWindow(context, height) {
-    const at = (t) => GUTTER.left + (t - firstTime()) / this.perPixel;
-    const from = at(state.from), to = Math.max(at(state.to), from + 2);
-    context.fillStyle = theme.css.select;
-    context.fillRect(from, 0, to - from, height);
-    context.fillStyle = theme.css.accent;
-    context.fillRect(from, 0, 2, height);
-    context.fillRect(to - 2, 0, 2, height);
+  drawWindow({ ctx, bbox, valToPos }) {
+    const { pxRatio } = uPlot;
+    const from = valToPos(state.from, "x", true), to = Math.max(valToPos(state.to, "x", true), from + 2 * pxRatio);
+    ctx.fillStyle = colour("select");
+    ctx.fillRect(from, bbox.top, to - from, bbox.height);
+    ctx.fillStyle = colour("accent");
+    ctx.fillRect(from, bbox.top, 2 * pxRatio, bbox.height);
+    ctx.fillRect(to - 2 * pxRatio, bbox.top, 2 * pxRatio, bbox.height);
   }
 }

@@ -3,13 +3,17 @@
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
+use crate::chart::Chart;
 use crate::latency::scale::Scale;
 use crate::template::{self, facts};
 use crate::text::{count, escape, number};
 
 const TEMPLATE: &str = include_str!("../assets/estimate.html");
-const WIDTH: f64 = 920.0;
-const HEIGHT: f64 = 330.0;
+const CHART: Chart = Chart {
+    width: 920.0,
+    height: 330.0,
+    area: AREA,
+};
 /// Where the drawing lies: left, right, top, bottom.
 const AREA: [f64; 4] = [64.0, 900.0, 14.0, 294.0];
 
@@ -88,10 +92,9 @@ fn drawing(program: &EstimatedProgram) -> String {
     let (lengths, feeds) = (edges(|f| f.length_mm), edges(|f| f.feed_mm_per_min));
     let x = Scale::new(lengths[0], lengths[1], AREA[0], AREA[1]);
     let y = Scale::new(feeds[0], feeds[1].max(programmed * 1.2), AREA[3], AREA[2]);
-    let mut text = format!(
-        "<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"block length against feed reached\">"
-    );
-    grid(&x, &y, &mut text);
+    let mut text = CHART.begin("block length against feed reached");
+    CHART.grid(x.places(), y.places(), &mut text);
+    CHART.names("block length, mm", "feed reached, mm/min", 5.0, &mut text);
     cells(fields, (&x, &y), &mut text);
     for feed in &program.programmed_mm_per_min {
         let at = y.place(*feed);
@@ -130,47 +133,6 @@ fn cells(fields: &[EstimatedField], (x, y): (&Scale, &Scale), text: &mut String)
             number(field.time_s)
         );
     }
-}
-
-fn grid(x: &Scale, y: &Scale, text: &mut String) {
-    for mark in x.marks() {
-        let at = x.place(mark);
-        let _ = write!(
-            text,
-            "<path class=\"grid\" d=\"M{at:.1} {} V{}\"/>",
-            AREA[2], AREA[3]
-        );
-        let label = AREA[3] + 15.0;
-        let _ = write!(
-            text,
-            "<text x=\"{at:.1}\" y=\"{label}\" text-anchor=\"middle\">{}</text>",
-            number(mark)
-        );
-    }
-    for mark in y.marks() {
-        let at = y.place(mark);
-        let _ = write!(
-            text,
-            "<path class=\"grid\" d=\"M{} {at:.1} H{}\"/>",
-            AREA[0], AREA[1]
-        );
-        let (left, below) = (AREA[0] - 6.0, at + 4.0);
-        let _ = write!(
-            text,
-            "<text x=\"{left}\" y=\"{below:.1}\" text-anchor=\"end\">{}</text>",
-            number(mark)
-        );
-    }
-    let bottom = HEIGHT - 5.0;
-    let _ = write!(
-        text,
-        "<text x=\"{}\" y=\"{bottom}\" text-anchor=\"end\">block length, mm</text>",
-        AREA[1]
-    );
-    let _ = write!(
-        text,
-        "<text x=\"6\" y=\"{bottom}\">feed reached, mm/min</text>"
-    );
 }
 
 #[cfg(test)]

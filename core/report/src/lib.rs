@@ -4,7 +4,7 @@
 //! path coloured by feed, and over one shared time axis the path feed, each axis' velocity, acceleration and jerk with
 //! their limits, the path deviation, σ and the following error. What exceeds a limit is red and listed.
 //! [`LatencyReport`] draws how late a thread woke, [`EstimateReport`] what programs are estimated to take, [`RefusalReport`]
-//! where a program is refused.
+//! where a program is refused, [`TuneReport`] what a search for settings found.
 //!
 //! ```
 //! use tandem_report::{Axis, Report, Samples, Unit};
@@ -29,6 +29,7 @@
 //! ```
 
 mod binding;
+mod chart;
 mod columns;
 mod differences;
 mod encode;
@@ -44,8 +45,10 @@ mod tables;
 mod template;
 mod text;
 mod thin;
+mod tune;
 
 pub use estimate::{EstimateReport, EstimatedField, EstimatedProgram};
 pub use latency::{LatencyBin, LatencyReport, LatencySeries};
 pub use model::{Axis, Ended, Report, Samples, Signal, Unit};
 pub use refusal::{RefusalReport, RefusedPlace};
+pub use tune::{TuneParameter, TunePoint, TuneReport, TuneScene, TuneStep};

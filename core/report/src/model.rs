@@ -1,8 +1,4 @@
-//! What a report is made from: the public data of this crate.
-
-use std::io;
-
-use crate::page;
+//! What a report is made from: the public data of this crate. How it is written stands in `page.rs`.
 
 /// A run to be drawn. Everything a caller knows goes in here; [`Report::write`] makes the page.
 #[derive(Clone, Debug, Default)]
@@ -54,19 +50,6 @@ impl Report {
             .as_ref()
             .and_then(|each| each.get(i));
         each.copied().or(self.path_tolerance_mm)
-    }
-
-    /// Writes the page: a complete HTML document in UTF-8.
-    ///
-    /// Above two million samples every curve is thinned to the extremes of equal time slices, and the page says so;
-    /// limits are judged on all samples before that.
-    ///
-    /// # Errors
-    ///
-    /// [`io::ErrorKind::InvalidInput`] where a column's length differs from that of `t_s`, or the fine period is not
-    /// positive; otherwise what `out` answers.
-    pub fn write(&self, out: &mut impl io::Write) -> io::Result<()> {
-        page::write(self, out, page::MAX_SAMPLES)
     }
 }
 

@@ -13,14 +13,23 @@ use crate::template;
 use crate::text::escape;
 
 /// Samples that a browser still draws fluently; more are thinned.
-pub(crate) const MAX_SAMPLES: usize = 2_000_000;
+const MAX_SAMPLES: usize = 2_000_000;
 
 const TEMPLATE: &str = include_str!("../assets/page.html");
 const STYLE: &str = include_str!("../assets/style.css");
-/// In the order in which they build on each other.
-const SCRIPTS: [&str; 13] = [
+/// What the operator's page draws with too, in the order in which they build on each other.
+const SHARED: [&str; 7] = [
+    "uPlot.iife.min.js",
+    "theme.js",
+    "format.js",
+    "camera.js",
+    "lines.js",
+    "scene.js",
+    "plot.js",
+];
+/// In the order in which they build on each other, and on those.
+const SCRIPTS: [&str; 10] = [
     include_str!("../assets/data.js"),
-    include_str!("../assets/format.js"),
     include_str!("../assets/colour.js"),
     include_str!("../assets/state.js"),
     include_str!("../assets/curve.js"),
@@ -28,14 +37,27 @@ const SCRIPTS: [&str; 13] = [
     include_str!("../assets/band.js"),
     include_str!("../assets/timeline.js"),
     include_str!("../assets/path.js"),
-    include_str!("../assets/scene.js"),
-    include_str!("../assets/pointer.js"),
     include_str!("../assets/plots.js"),
     include_str!("../assets/main.js"),
 ];
 
+impl Report {
+    /// Writes the page: a complete HTML document in UTF-8.
+    ///
+    /// Above two million samples every curve is thinned to the extremes of equal time slices, and the page says so;
+    /// limits are judged on all samples before that.
+    ///
+    /// # Errors
+    ///
+    /// [`io::ErrorKind::InvalidInput`] where a column's length differs from that of `t_s`, or the fine period is not
+    /// positive; otherwise what `out` answers.
+    pub fn write(&self, out: &mut impl Write) -> io::Result<()> {
+        write(self, out, MAX_SAMPLES)
+    }
+}
+
 /// Writes the page with at most about `cap` points in each curve.
-pub(crate) fn write(report: &Report, out: &mut dyn Write, cap: usize) -> io::Result<()> {
+fn write(report: &Report, out: &mut dyn Write, cap: usize) -> io::Result<()> {
     let derived = Derived::of(report, cap)?;
     template::write(TEMPLATE, out, |gap, out| fill(gap, report, &derived, out))
 }
@@ -50,8 +72,13 @@ fn fill(gap: &str, report: &Report, derived: &Derived, out: &mut dyn Write) -> i
         "peaks-head" => tables::peaks_head(report),
         "peaks" => tables::peaks(report, derived),
         "findings" => tables::findings(derived),
-        "style" => STYLE.into(),
-        "script" => SCRIPTS.concat(),
+        "style" => {
+            ["colours.css", "uPlot.min.css"]
+                .map(tandem_view::text)
+                .concat()
+                + STYLE
+        }
+        "script" => SHARED.map(tandem_view::text).join("\n") + &SCRIPTS.concat(),
         "about" => about(report, derived)?,
         "columns" => {
             return derived
@@ -177,7 +204,10 @@ mod tests {
 
     #[test]
     fn nothing_is_fetched() {
+        // The page has uPlot's notice, and with it an address in a comment.
+        let notice = |line: &&str| !line.starts_with("/*! https://github.com/leeoniya/uPlot");
         let html = html(&report(3), MAX_SAMPLES);
+        let html = html.lines().filter(notice).collect::<String>();
         assert!(html.contains("default-src 'none'"));
         assert!(!html.contains("http:") && !html.contains("https:") && !html.contains("src="));
     }

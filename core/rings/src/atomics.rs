@@ -35,7 +35,7 @@ pub const MAX_ENTRIES: usize = 250;
 
 /// Entries of the ring that the fine loop comes past in one period at most: each may be a cache miss and takes up to a
 /// tenth of a µs for every axis, and a period of 1 ms has time for 250.
-pub fn most_entries_a_period(fine_period_s: f64) -> usize {
+pub fn max_entries_a_period(fine_period_s: f64) -> usize {
     const FEWEST: f64 = 60.0;
     const PER_S: f64 = 250_000.0;
     (fine_period_s * PER_S).clamp(FEWEST, MAX_ENTRIES as f64) as usize
@@ -63,10 +63,10 @@ pub struct Depth {
     pub full: AtomicBool,
     /// Highest rate of program time from which the machine comes to rest inside what the ring holds, and at which no more
     /// entries come in a fine period than the fine loop looks at; 1 where neither matters.
-    pub most_rate: AtomicF64,
+    pub max_rate: AtomicF64,
     /// Counts how often the rough loop has looked after the ring.
     pub served: AtomicU32,
-    /// Machine time behind such a look for which `most_rate` holds without the next one, s.
+    /// Machine time behind such a look for which `max_rate` holds without the next one, s.
     pub served_for_s: AtomicF64,
     /// Epoch that the other fields are about; stored behind them when an epoch begins.
     pub epoch: AtomicU32,
@@ -80,7 +80,7 @@ impl Depth {
         self.stop_s.store(f64::INFINITY);
         self.stop_ramp_s.store(0.0);
         self.full.store(false, Ordering::Release);
-        self.most_rate.store(1.0);
+        self.max_rate.store(1.0);
         self.wall_s.store(now_s);
         self.epoch.store(epoch, Ordering::Release);
     }
@@ -107,10 +107,74 @@ impl Default for Depth {
             wall_s: AtomicF64::new(0.0),
             required_s: AtomicF64::new(f64::INFINITY),
             full: AtomicBool::new(false),
-            most_rate: AtomicF64::new(1.0),
+            max_rate: AtomicF64::new(1.0),
             served: AtomicU32::new(0),
             served_for_s: AtomicF64::new(0.0),
             epoch: AtomicU32::new(0),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_number_comes_back_as_it_was_stored() {
+        for value in [0.0, -0.0, 1.5, -1e300, f64::INFINITY, f64::MIN_POSITIVE] {
+            let stored = AtomicF64::new(value);
+            assert_eq!(stored.load().to_bits(), value.to_bits());
+            stored.store(-value);
+            assert_eq!(stored.load().to_bits(), (-value).to_bits());
+        }
+    }
+
+    #[test]
+    fn a_period_has_time_for_entries_in_proportion_within_bounds() {
+        let entries = [1e-6, 0.0004, 0.000_5, 0.001, 0.01].map(max_entries_a_period);
+        assert_eq!(entries, [60, 100, 125, 250, 250]);
+    }
+
+    #[test]
+    fn motion_starts_when_the_worst_stop_is_queued_and_not_before() {
+        let depth = Depth::default();
+        assert!(!depth.may_start(0.0), "nothing is known of the queue");
+        depth.required_s.store(0.5);
+        depth.wall_s.store(2.0);
+        assert!(depth.may_start(1.5) && depth.may_start(0.0));
+        assert!(!depth.may_start(1.6));
+        depth.wall_s.store(f64::INFINITY);
+        assert!(depth.may_start(1e9), "it ends at rest");
+    }
+
+    #[test]
+    fn an_epoch_begins_with_an_empty_queue() {
+        let depth = Depth::default();
+        assert!(depth.is_of(0) && !depth.is_of(1));
+        for (number, shared) in [
+            &depth.stop_deceleration_mm_per_s2,
+            &depth.stop_s,
+            &depth.stop_ramp_s,
+            &depth.wall_s,
+            &depth.required_s,
+            &depth.max_rate,
+        ]
+        .into_iter()
+        .enumerate()
+        {
+            shared.store(number as f64 + 0.5);
+        }
+        depth.full.store(true, Ordering::Release);
+        depth.begin(3, 7.0);
+        assert!(depth.is_of(3) && !depth.is_of(0));
+        assert!(!depth.may_start(0.0), "nothing of it is queued");
+        assert_eq!(depth.wall_s.load(), 7.0);
+        assert_eq!(
+            (depth.max_rate.load(), depth.stop_ramp_s.load()),
+            (1.0, 0.0)
+        );
+        let stops = [&depth.stop_deceleration_mm_per_s2, &depth.stop_s];
+        assert!(stops.iter().all(|stop| stop.load() == f64::INFINITY));
+        assert!(!depth.full.load(Ordering::Acquire));
     }
 }

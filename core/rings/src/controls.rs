@@ -1,7 +1,7 @@
 //! The operator's commands and the fine loop's status, as atomics.
 
 use std::sync::atomic::Ordering::Relaxed;
-use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64};
+use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU32, AtomicU64};
 
 use tandem_sdk::{JointState, MAX_AXES};
 
@@ -13,7 +13,7 @@ pub struct JogControls {
     /// Counts how often the operator has said that the jog is to go on. Written by the soft side.
     pub beats: AtomicU64,
     /// Fine periods without a beat after which the jog is let go; 0 where nothing needs to be kept alive.
-    pub most_periods: AtomicU64,
+    pub max_periods: AtomicU64,
     /// The jog is let go: stop on the path, drop what is queued, and report the rest. Set by the soft side, and by the
     /// fine loop where the keep-alive is late; cleared by the soft side when it has the rest. Holds stay as they are.
     pub let_go: AtomicBool,
@@ -97,6 +97,19 @@ pub struct SpindleStatus {
     pub turns_rad_per_s: AtomicF64,
 }
 
+/// How well the drives are heard.
+#[derive(Debug, Default)]
+pub struct BusStatus {
+    /// Age of the oldest feedback of a joint, fine periods: 0 is new.
+    pub age_periods: AtomicU32,
+    /// Fine periods since the drives were attached in which that was not new: a frame was lost or late.
+    pub old_periods: AtomicU64,
+    /// How much later than the bus wants it the last exchange was, ns; counts where `has_phase`.
+    pub phase_ns: AtomicI64,
+    /// Whether the bus says so.
+    pub has_phase: AtomicBool,
+}
+
 /// What the fine loop says of itself; for looking at, not for deciding.
 #[derive(Debug, Default)]
 pub struct Status {
@@ -120,6 +133,8 @@ pub struct Status {
     pub tripped: AtomicU64,
     /// What the spindle does.
     pub spindle: SpindleStatus,
+    /// How well the drives are heard.
+    pub bus: BusStatus,
     /// True while nothing moves and nothing is queued.
     pub idle: AtomicBool,
     /// Digital inputs as last read.

@@ -14,10 +14,10 @@ mod sample;
 mod switched;
 
 pub use atomics::{
-    AtomicF64, Depth, MAX_ENTRIES, STOP_JERK_SHARE, STOP_SHARE, most_entries_a_period,
+    AtomicF64, Depth, MAX_ENTRIES, STOP_JERK_SHARE, STOP_SHARE, max_entries_a_period,
 };
-pub use controls::{Controls, JogControls, JointStatus, SpindleStatus, Status};
-pub use counts::Counts;
+pub use controls::{BusStatus, Controls, JogControls, JointStatus, SpindleStatus, Status};
+pub use counts::{Counters, Counts};
 pub use operator_inputs::OperatorInputs;
 pub use request::{RequestKind, StrategyRequest};
 pub use rest::{Rest, RestCause};
@@ -47,7 +47,8 @@ pub enum Queued {
 /// A feed ratio asked for by the strategy and the policy, with the tick from which it counts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ratio {
-    /// First tick at which it acts. One that comes later acts at once and is counted.
+    /// First tick at which it acts: over the rough period that begins there the ratio is led over to it. One that comes later begins
+    /// at once, and is counted.
     pub tick: u64,
     /// The ratio.
     pub ratio: f64,
@@ -67,7 +68,7 @@ impl Sizes {
     pub const SEGMENTS: [usize; 2] = [4096, 65_536];
 
     /// Segments of a ring for as many `entries`, but no more than there is memory for. Where that is less, the rough loop
-    /// tells the fine loop so ([`Depth::most_rate`]).
+    /// tells the fine loop so ([`Depth::max_rate`]).
     pub fn segments_for(entries: f64) -> usize {
         let [fewest, most] = Self::SEGMENTS;
         (entries.clamp(fewest as f64, most as f64) as usize).next_power_of_two()
@@ -194,4 +195,36 @@ pub fn bridge_with(
             requests: requests_in,
         },
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ring_is_as_long_as_asked_for_within_what_there_is_memory_for() {
+        let sizes = [0.0, 4096.0, 4097.0, 60_000.0, 1e12, f64::INFINITY].map(Sizes::segments_for);
+        assert_eq!(sizes, [4096, 4096, 8192, 65_536, 65_536, 65_536]);
+    }
+
+    #[test]
+    fn what_one_end_gives_the_other_takes_and_what_all_share_is_one() {
+        let (mut rough, mut fine, mut host) = bridge(Sizes::default());
+        host.controls.feed_override.store(0.25);
+        assert_eq!(fine.controls.feed_override.load(), 0.25);
+        fine.status.feed_mm_per_s.store(3.0);
+        assert_eq!(rough.status.feed_mm_per_s.load(), 3.0);
+        assert_eq!(host.status.feed_mm_per_s.load(), 3.0);
+        rough.depth.wall_s.store(9.0);
+        assert_eq!(fine.depth.wall_s.load(), 9.0);
+        let ratio = Ratio {
+            tick: 5,
+            ratio: 0.5,
+        };
+        host.ratios.push(ratio).unwrap();
+        assert_eq!(fine.ratios.pop(), Ok(ratio));
+        assert!(rough.rests.pop().is_err() && host.samples.pop().is_err());
+        assert_eq!(fine.samples.slots(), Sizes::default().samples);
+        assert_eq!(rough.segments.slots(), Sizes::default().segments);
+    }
 }

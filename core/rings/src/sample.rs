@@ -123,14 +123,18 @@ pub struct Sample {
     pub speed: AxisVector,
     /// Mean motor current per joint, A.
     pub current_a: AxisVector,
-    /// Path speed commanded, mm/s.
+    /// Path speed of the setpoints, mm/s.
     pub feed_mm_per_s: f64,
+    /// The same at the end of the period, where [`Sample::feed_mm_per_s`] is its mean.
+    pub end_feed_mm_per_s: f64,
     /// Programmed feed, mm/s; infinite for rapids.
     pub programmed_feed_mm_per_s: f64,
     /// Rate of program time at the end of the period.
     pub sigma: f64,
-    /// Feed ratio in force.
+    /// Feed ratio in force, of override, strategy and policy.
     pub ratio: f64,
+    /// The operator's feed override; 1 where the program forbids it.
+    pub feed_override: f64,
     /// Spindle speed read back, rad/s.
     pub spindle_rad_per_s: f64,
     /// Spindle, coolant and outputs as they were sent.
@@ -149,4 +153,17 @@ pub struct Sample {
     pub cause: StopCause,
     /// What the operator asked for in this period.
     pub given: OperatorInputs,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_state_is_found_by_its_number_and_a_number_that_is_none_is_standstill() {
+        for number in 0..7 {
+            assert_eq!(MachineState::from_number(number) as u32, number);
+        }
+        assert_eq!(MachineState::from_number(7), MachineState::Standstill);
+    }
 }

@@ -66,3 +66,22 @@ impl Switched {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn coolant_and_outputs_of_the_user_share_the_bits() {
+        let on = |outputs: &[u32]| Switched {
+            outputs: outputs.iter().fold(0, |bits, output| bits | 1 << output),
+            ..Switched::default()
+        };
+        let names =
+            [&[][..], &[MIST], &[FLOOD], &[MIST, FLOOD]].map(|outputs| on(outputs).coolant());
+        assert_eq!(names, ["off", "mist", "flood", "both"]);
+        let all = on(&[0, 5, MIST, FLOOD]);
+        assert!(all.is_on(5) && all.is_on(MIST) && !all.is_on(1));
+        assert_eq!(all.user_outputs(), 0b10_0001);
+    }
+}

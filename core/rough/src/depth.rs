@@ -26,7 +26,7 @@
 //! rough period, the planner is asked for several at a time. It is still finite, blocks of 0.1 µm are short, and so the
 //! ring can be full before the depth is there. Then the machine is not late but too fast for what can be queued: the
 //! rough loop tells the fine loop the highest σ that a stop inside the ring allows, and the governor drives no faster
-//! (`Depth::most_rate`, counted in `queue_limited_samples`). Along the path σ²/2 falls by `a_s/v` per s of program time
+//! (`Depth::max_rate`, counted in `queue_limited_samples`). Along the path σ²/2 falls by `a_s/v` per s of program time
 //! at most, so with E the integral of `a_s/v` over what is queued, and `t` the time that the rough loop may be late and
 //! the deceleration takes to build up, it is the greatest σ with
 //!
@@ -46,7 +46,7 @@
 use std::collections::VecDeque;
 
 use crate::window::SlidingMax;
-use tandem_rings::{STOP_JERK_SHARE, STOP_SHARE, most_entries_a_period};
+use tandem_rings::{STOP_JERK_SHARE, STOP_SHARE, max_entries_a_period};
 use tandem_sdk::{Segment, SegmentFlags};
 
 /// The worst stop over what is queued.
@@ -139,8 +139,7 @@ impl QueueDepth {
             ramps: SlidingMax::default(),
             braking: Braking::default(),
             dense: SlidingMax::default(),
-            ends_s: vec![f64::NEG_INFINITY; most_entries_a_period(fine_period_s)]
-                .into_boxed_slice(),
+            ends_s: vec![f64::NEG_INFINITY; max_entries_a_period(fine_period_s)].into_boxed_slice(),
             next_end: 0,
             rough_period_s,
             fine_period_s,
@@ -349,7 +348,7 @@ mod tests {
         let mut depth = QueueDepth::new(0.01, 0.001, 1.0);
         depth.push(&level(50.0, 100.0), 1.0);
         assert_eq!(depth.rate_for_entries(), 1.0);
-        let most = most_entries_a_period(0.001);
+        let most = max_entries_a_period(0.001);
         for entry in 1..=2 * most {
             depth.push(
                 &level(50.0, 100.0),

@@ -2,6 +2,7 @@
 //! period; it may allocate and be late, but what it queues can always be brought to rest on the path.
 
 mod depth;
+mod gather;
 mod policy;
 mod queue;
 mod rest;

@@ -1,4 +1,4 @@
-//! Policies: blocks are tuned in windows of a fixed number before the planner sees them.
+//! Policies: blocks are tuned in windows of a fixed number before the planner sees them, beside what the program states.
 
 use std::collections::VecDeque;
 
@@ -13,6 +13,10 @@ pub const WINDOW_BLOCKS: usize = 64;
 
 /// What decides on blocks, a window at a time. Called on the rough loop; may allocate.
 pub trait BlockPolicy: Send {
+    /// The program states `value` for number `which` of what is watched for ([`Item::Stated`]): it holds for the blocks offered
+    /// from here on.
+    fn state(&mut self, _which: usize, _value: f64) {}
+
     /// The next block of a window, and its curve.
     fn offer(&mut self, block: &Block, curve: Option<Curve<'_>>);
 
@@ -89,12 +93,22 @@ impl<S: Source, P: BlockPolicy> Tuned<S, P> {
     /// Asks the policy about the first `count` blocks.
     fn tune(&mut self, count: usize) {
         let Self { policy, items, .. } = self;
-        let mut blocks = items.iter().filter(|item| is_block(item));
-        for item in blocks.by_ref().take(count) {
-            let (block, curve) = block_of(item);
-            policy.offer(block, curve);
+        let (mut offered, mut rest) = (0, items.iter());
+        for item in rest.by_ref() {
+            match item {
+                Item::Stated { which, value } => policy.state(*which, *value),
+                Item::Block(..) => {
+                    let (block, curve) = block_of(item);
+                    policy.offer(block, curve);
+                    offered += 1;
+                }
+                _ => {}
+            }
+            if offered == count {
+                break;
+            }
         }
-        policy.decide(blocks.next().map(block_of));
+        policy.decide(rest.find(|item| is_block(item)).map(block_of));
         let blocks = items.iter_mut().filter(|item| is_block(item)).take(count);
         for (index, item) in blocks.enumerate() {
             let (block, curve) = block_of(item);
@@ -114,10 +128,15 @@ impl<S: Source, P: BlockPolicy> Tuned<S, P> {
     fn hand_over(&mut self, count: usize, ends: bool, items: &mut Vec<Item>) {
         let mut left = count;
         while let Some(item) = self.items.pop_front() {
-            if is_block(&item) {
-                left -= 1;
+            match item {
+                // What stands behind the last block holds for the next window.
+                Item::Stated { which, value } if left == 0 => self.policy.state(which, value),
+                Item::Stated { .. } => {}
+                item => {
+                    left -= usize::from(is_block(&item));
+                    items.push(item);
+                }
             }
-            items.push(item);
             if left == 0 && !ends {
                 break;
             }

@@ -14,11 +14,20 @@ type Seen = Arc<Mutex<Vec<(Vec<u64>, Option<u64>)>>>;
 struct Recorder {
     window: Vec<u64>,
     seen: Seen,
+    /// What the program stated last of number 0, and what it was for each block.
+    stated: f64,
+    of_blocks: Arc<Mutex<Vec<f64>>>,
 }
 
 impl BlockPolicy for Recorder {
+    fn state(&mut self, which: usize, value: f64) {
+        assert_eq!(which, 0);
+        self.stated = value;
+    }
+
     fn offer(&mut self, block: &Block, _curve: Option<Curve<'_>>) {
         self.window.push(block.index);
+        self.of_blocks.lock().unwrap().push(self.stated);
     }
 
     fn decide(&mut self, next: Option<(&Block, Option<Curve<'_>>)>) {
@@ -212,4 +221,52 @@ fn an_abort_drops_the_blocks_of_windows_to_come() {
         (items.len(), windows(&seen)),
         (1, vec![(64, Some(64)), (1, None)])
     );
+}
+
+#[test]
+fn what_the_program_states_holds_from_its_place_on_however_windows_fall() {
+    let stated = |value: f64| Item::Stated { which: 0, value };
+    for at_once in [1, 3, 64, 65, 400] {
+        // In front of the first block, between two windows, within one, behind the last block before a wait.
+        let mut items = vec![stated(1.0)];
+        for index in 0..150 {
+            items.push(block(index));
+            match index {
+                63 => items.push(stated(2.0)),
+                100 => items.extend([stated(9.0), stated(3.0)]),
+                120 => items.extend([stated(4.0), wait()]),
+                _ => {}
+            }
+        }
+        items.push(stated(5.0));
+        let mut script: Vec<Vec<Item>> = vec![vec![]];
+        for item in items {
+            let ends = ends_stretch(&item);
+            let last = script.last_mut().unwrap();
+            last.push(item);
+            if ends || last.len() == at_once {
+                script.push(vec![]);
+            }
+        }
+        script.retain(|items| !items.is_empty());
+        let recorder = Recorder::default();
+        let seen = Arc::clone(&recorder.of_blocks);
+        let mut source = Tuned::new(Script(script.into_iter().map(Ok).collect()), recorder);
+        let (handed, error) = drain(&mut source);
+        assert_eq!(error, None);
+        assert!(
+            !handed
+                .iter()
+                .any(|item| matches!(item, Item::Stated { .. })),
+            "it is the policy's alone"
+        );
+        let expected = |index: u64| match index {
+            0..=63 => 1.0,
+            64..=100 => 2.0,
+            101..=120 => 3.0,
+            _ => 4.0,
+        };
+        let expected: Vec<f64> = (0..150).map(expected).collect();
+        assert_eq!(*seen.lock().unwrap(), expected, "{at_once} at once");
+    }
 }

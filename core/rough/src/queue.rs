@@ -210,13 +210,13 @@ impl Queue {
         let now_s = self.end.status.program_time_s.load();
         self.depth.passed(now_s);
         let shared = &self.end.depth;
-        let most_rate = self.depth.rate_for_entries();
-        let most_rate = if full {
-            most_rate.min(self.depth.rate_for_wall(now_s, self.queued_s))
+        let max_rate = self.depth.rate_for_entries();
+        let max_rate = if full {
+            max_rate.min(self.depth.rate_for_wall(now_s, self.queued_s))
         } else {
-            most_rate
+            max_rate
         };
-        shared.most_rate.store(most_rate);
+        shared.max_rate.store(max_rate);
         shared.full.store(full, Release);
         shared
             .stop_deceleration_mm_per_s2

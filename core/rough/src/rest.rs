@@ -41,6 +41,7 @@ impl RoughLoop {
             self.done,
             self.edge_awaited,
         ) = (false, false, false, false);
+        self.gathering.restart();
         if rest.cause == RestCause::Abort {
             (self.waiting, self.waited_s) = (None, 0.0);
             self.next = self.items.len();

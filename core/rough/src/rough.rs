@@ -6,6 +6,7 @@ use tandem_sdk::{Accepted, Edge, Event, EventKind, NurbsData, Planner};
 
 use crate::Observer;
 use crate::depth::QueueDepth;
+use crate::gather::Gathering;
 use crate::queue::Queue;
 use crate::seams::{ROUNDING, Seams};
 use crate::source::Source;
@@ -132,6 +133,9 @@ pub struct RoughLoop {
     pub(crate) edge_awaited: bool,
     /// More may come in time: the plan is left open.
     awaits_more: bool,
+    /// The planner has room, and does not know whether more comes.
+    has_room: bool,
+    pub(crate) gathering: Gathering,
     line: u32,
     last_block: u64,
     pub(crate) done: bool,
@@ -169,6 +173,8 @@ impl RoughLoop {
             waited_s: 0.0,
             edge_awaited: false,
             awaits_more: false,
+            has_room: false,
+            gathering: Gathering::default(),
             line: 0,
             last_block: 0,
             done: false,
@@ -211,7 +217,14 @@ impl RoughLoop {
     fn fill(&mut self, observer: &mut dyn Observer) -> Result<(), RoughError> {
         let (period_s, advance_s) = (self.config.rough_period_s, self.config.advance_s);
         let mut short = 0;
+        self.gathering.pass(period_s);
+        if !self.done && self.source.streams() && self.queue.is_deep(MARGIN_PERIODS * period_s) {
+            // A sender has few places to wait in: its lines go to the planner as they come, not when they are needed, or the planner
+            // would see no further than those places and plan to a rest at the last of them.
+            self.offer(observer)?;
+        }
         while !self.done && !self.queue.is_deep(MARGIN_PERIODS * period_s) {
+            let last_block = self.last_block;
             self.feed(observer)?;
             if self.awaits_more {
                 return Ok(());
@@ -238,13 +251,25 @@ impl RoughLoop {
             self.queue.flush(false, false);
             // What came counts, not what the planner says of it.
             let emitted_s = self.queue.emitted_s() - before_s;
+            if emitted_s > 0.0 {
+                self.gathering.emitted(self.queue.is_deep(0.0));
+            }
+            if emitted_s == 0.0 && self.has_room {
+                // All that is left of the plan depends on what follows.
+                if self.gathering.may_wait(period_s) {
+                    return Ok(());
+                }
+                self.finish();
+                continue;
+            }
             if emitted_s == 0.0 && !self.finished {
                 return Err(planner_error(
                     Some(self.line),
                     "it is full, and advance emits nothing",
                 ));
             }
-            short += u32::from(emitted_s < advance_s / 2.0);
+            // A planner may wait for the next block, which its buffer has room for.
+            short += u32::from(emitted_s < advance_s / 2.0 && self.last_block == last_block);
             if short > MAX_SHORT_ADVANCES {
                 return Err(planner_error(
                     None,
@@ -257,6 +282,7 @@ impl RoughLoop {
 
     /// The planner has emitted all it was given: the program has ended, or it waits for an input.
     fn stretch_is_over(&mut self) {
+        self.gathering.restart();
         self.queue.release_events();
         if !self.awaits_answer() && self.dry {
             self.queue.event(Event::new(
@@ -271,9 +297,31 @@ impl RoughLoop {
         }
     }
 
-    /// Offers blocks until the planner is full or the program gives no more for now.
+    /// Offers blocks until the planner is full or the program gives no more for now: then it is told that nothing follows. Where
+    /// somebody sends, more may come in time, and until it is late the planner plans what does not depend on that.
     fn feed(&mut self, observer: &mut dyn Observer) -> Result<(), RoughError> {
-        self.awaits_more = false;
+        (self.awaits_more, self.has_room) = (false, false);
+        if self.offer(observer)? || self.finished {
+            return Ok(());
+        }
+        if !self.source.streams() || self.dry || self.awaits_answer() {
+            self.finish();
+            return Ok(());
+        }
+        // What is queued lasts until more may have come: a rough period longer than a stop asks for.
+        let period_s = self.config.rough_period_s;
+        self.awaits_more = self.queue.is_deep(period_s) || self.gathering.goes_on(period_s);
+        self.has_room = true;
+        Ok(())
+    }
+
+    fn finish(&mut self) {
+        self.planner.finish();
+        self.finished = true;
+    }
+
+    /// Offers blocks until the planner is full, which is the answer, or the program gives no more for now.
+    fn offer(&mut self, observer: &mut dyn Observer) -> Result<bool, RoughError> {
         while !self.awaits_answer() && self.load()? {
             match &self.items[self.next] {
                 Item::Block(block, curve) => {
@@ -285,8 +333,9 @@ impl RoughLoop {
                     if accepted.map_err(|e| planner_error(Some(block.line), &e.to_string()))?
                         == Accepted::Full
                     {
-                        return Ok(());
+                        return Ok(true);
                     }
+                    self.gathering.accepted(block);
                     self.edge_awaited = block.stop_on.edge != Edge::None;
                     self.queue.accepted(block, curve.as_ref());
                 }
@@ -297,24 +346,13 @@ impl RoughLoop {
                 }
                 Item::Wait(wait) => self.waiting = Some(*wait),
                 // Who runs commands takes them out of what they hand on.
-                Item::Command(_) => {}
+                Item::Command(_) | Item::Stated { .. } => {}
                 Item::End => self.dry = true,
             }
             self.finished = false;
             self.next += 1;
         }
-        self.awaits_more = !self.finished && self.may_wait_for_more();
-        if !self.finished && !self.awaits_more {
-            self.planner.finish();
-            self.finished = true;
-        }
-        Ok(())
-    }
-
-    /// Whether what is queued lasts until more may have come: a rough period longer than a stop asks for.
-    fn may_wait_for_more(&mut self) -> bool {
-        let streams = self.source.streams() && !self.dry && !self.awaits_answer();
-        streams && !self.queue.plan_rests() && self.queue.is_deep(self.config.rough_period_s)
+        Ok(false)
     }
 
     /// Whether the program can go on only when the machine has answered: an input (M66), or where a probe has touched.

@@ -1,14 +1,14 @@
 //! Planners that never come to an end end in words, and a rough period is bounded work.
 
 use std::sync::Arc;
-use std::sync::atomic::AtomicU64;
 use std::sync::atomic::Ordering::Relaxed;
+use std::sync::atomic::{AtomicBool, AtomicU64};
 
 use tandem_gcode::Item;
 use tandem_rings::{FineEnd, HostEnd, Rest, Sizes, bridge};
 use tandem_sdk::{
-    Accepted, Advanced, AxisVector, Block, Curve, Planner, PlannerDescription, PluginError,
-    Segment, SegmentFlags, SegmentSink,
+    Accepted, Advanced, AxisVector, Block, BlockKind, Curve, Planner, PlannerDescription,
+    PluginError, Segment, SegmentFlags, SegmentSink,
 };
 
 use super::*;
@@ -174,4 +174,119 @@ fn a_ring_that_gets_room_is_filled_in_the_same_period_and_said_to_be_full() {
         assert_eq!(calls.load(Relaxed), 1);
         assert!(fine.segments.slots() == 8 && fine.depth.full.load(Relaxed));
     }
+}
+
+/// A sender that gives a line in each of the first periods, and then nothing.
+struct Sender {
+    lines: u64,
+    given: u64,
+    period: bool,
+}
+
+impl Source for Sender {
+    fn next_items(&mut self, items: &mut Vec<Item>) -> Result<bool, String> {
+        if std::mem::take(&mut self.period) && self.given < self.lines {
+            self.given += 1;
+            let block = Block {
+                kind: BlockKind::Line,
+                index: self.given,
+                ..Block::at(AxisVector::ZERO)
+            };
+            items.push(Item::Block(block, None));
+        }
+        Ok(true)
+    }
+    fn period(&mut self) {
+        self.period = true;
+    }
+    fn streams(&self) -> bool {
+        true
+    }
+    fn provide_input(&mut self, _value: f64) {}
+    fn provide_rest(&mut self, _rest: &Rest) -> bool {
+        true
+    }
+}
+
+/// Each of its blocks takes three rough periods, of which the last is not planned before the next block or the end is known.
+struct Waits {
+    left_s: f64,
+    finished: Arc<AtomicBool>,
+}
+
+const BLOCK_S: f64 = 3.0 * ROUGH_PERIOD_S;
+
+impl Planner for Waits {
+    fn describe(&self) -> PlannerDescription {
+        PlannerDescription::order_2()
+    }
+    fn check(&self, _block: &Block, _curve: Option<Curve<'_>>) -> Result<(), PluginError> {
+        Ok(())
+    }
+    fn accept(
+        &mut self,
+        _block: &Block,
+        _curve: Option<Curve<'_>>,
+    ) -> Result<Accepted, PluginError> {
+        self.left_s += BLOCK_S;
+        self.finished.store(false, Relaxed);
+        Ok(Accepted::Accepted)
+    }
+    fn finish(&mut self) {
+        self.finished.store(true, Relaxed);
+    }
+    fn advance(
+        &mut self,
+        duration_s: f64,
+        sink: &mut dyn SegmentSink,
+    ) -> Result<Advanced, PluginError> {
+        let finished = self.finished.load(Relaxed);
+        let kept_s = if finished { 0.0 } else { ROUGH_PERIOD_S };
+        let emitted_s = duration_s.min(self.left_s - kept_s).max(0.0);
+        self.left_s -= emitted_s;
+        let done = finished && self.left_s < 1e-9;
+        if emitted_s > 0.0 {
+            let flags = [SegmentFlags::default(), SegmentFlags::ENDS_AT_REST];
+            piece(emitted_s, flags[usize::from(done)], sink);
+        }
+        Ok(Advanced {
+            duration_s: emitted_s,
+            done: u32::from(done),
+        })
+    }
+    fn reset(&mut self, _position: &AxisVector) {}
+}
+
+#[test]
+fn what_a_sender_has_sent_is_driven_as_far_as_it_is_known_before_its_end_is_planned() {
+    const LINES: u64 = 12;
+    let finished = Arc::new(AtomicBool::new(false));
+    let planner = Box::new(Waits {
+        left_s: 0.0,
+        finished: Arc::clone(&finished),
+    });
+    let sender = Sender {
+        lines: LINES,
+        given: 0,
+        period: false,
+    };
+    let (rough, _fine, host) = bridge(Sizes::default());
+    let config = RoughConfig::new(ROUGH_PERIOD_S, ROUGH_PERIOD_S);
+    let mut rough = RoughLoop::new(config, Box::new(sender), planner, rough);
+    let mut now_s = 0.0;
+    let whole_s = LINES as f64 * BLOCK_S;
+    while !finished.load(Relaxed) {
+        rough.step(&mut ()).unwrap();
+        // What is queued is driven, once there is as much as a stop asks for: two rough periods.
+        if rough.queue.emitted_s() - now_s >= 2.0 * ROUGH_PERIOD_S {
+            now_s += ROUGH_PERIOD_S;
+            host.status.program_time_s.store(now_s);
+        }
+        assert!(now_s < whole_s, "the end is never planned");
+    }
+    // All but what depends on what follows, and no more left in the queue than a stop asks for and one period.
+    assert!(
+        now_s >= whole_s - (1.0 + 2.0 + 1.0) * ROUGH_PERIOD_S - 1e-9,
+        "{now_s} of {whole_s} s"
+    );
 }

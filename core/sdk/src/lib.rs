@@ -66,4 +66,4 @@ pub use serde;
 extern crate self as tandem_sdk;
 
 /// Number of the plugin contract. A plugin built against another number is refused.
-pub const ABI_VERSION: u32 = 4;
+pub const ABI_VERSION: u32 = 5;

@@ -203,6 +203,9 @@ pub trait SegmentSink {
 /// [`Accepted::Full`] or the program ends (`finish`), `advance` by rough periods until done; then `accept` again (a new
 /// stretch of program) or `reset`. In a steady state no method allocates.
 ///
+/// Where somebody sends the blocks while they are driven, `advance` is also called while there is room for the next one, which has
+/// not come yet: then the planner emits what does not depend on it, which may be nothing, and `accept` or `finish` follows.
+///
 /// What has been emitted can always be brought to rest on the path by the fine loop: each segment declares the path
 /// deceleration it leaves ([`Segment::stop_deceleration_mm_per_s2`]).
 pub trait Planner: Send {

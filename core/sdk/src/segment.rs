@@ -70,12 +70,37 @@ layout_of_enum!(Edge {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(C)]
 pub struct StopOn {
-    /// Number of the input, 0 to 63.
+    /// Number of the input, 0 to 63; or axes, by [`StopOn::home_switches`].
     pub input: u32,
     /// The change waited for.
     pub edge: Edge,
     /// 1 where reaching the end without the edge is a fault (G38.2, G38.4), else 0.
     pub miss_is_fault: u32,
+}
+
+impl StopOn {
+    /// In [`StopOn::input`]: the other bits are no number, but a bit each for axes.
+    const HOME: u32 = 1 << 31;
+
+    /// The home switch of any of these axes, a bit each, whatever its input: a rising `edge` is one that trips, a falling one is
+    /// one that is released. Drives catch no position at it.
+    pub const fn home_switches(axes: u32, edge: Edge) -> Self {
+        Self {
+            input: Self::HOME | axes,
+            edge,
+            miss_is_fault: 0,
+        }
+    }
+
+    /// The axes whose home switches are waited for, a bit each; none where it is an input.
+    #[inline]
+    pub const fn home_axes(&self) -> Option<u32> {
+        if self.input & Self::HOME == 0 {
+            None
+        } else {
+            Some(self.input & !Self::HOME)
+        }
+    }
 }
 
 layout!(StopOn {

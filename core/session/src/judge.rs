@@ -54,6 +54,16 @@ impl fmt::Display for Refusal {
     }
 }
 
+/// A line of which every block can be driven.
+pub struct JudgedLine {
+    /// The interpreter as it is behind it.
+    pub behind: Interpreter,
+    /// What it orders; that a program ends is left out, which is not what an operator has to say.
+    pub items: Vec<Item>,
+    /// It ends a program: M2, M30, a `%` that closes.
+    pub ends: bool,
+}
+
 /// Judges lines as the planner and the machine will have to drive them.
 pub struct LineJudge {
     machine: Machine,
@@ -67,8 +77,7 @@ impl LineJudge {
         Self { machine, planner }
     }
 
-    /// The items of line `number`, and the interpreter as it is behind the line, where every block of it can be driven;
-    /// `before` stays what it was. M2 is left out: it ends a program, and not what an operator has to say. Soft side; allocates.
+    /// Line `number`, where every block of it can be driven; `before` stays what it was. Soft side; allocates.
     ///
     /// # Errors
     /// What is wrong with the line, with its place.
@@ -77,7 +86,7 @@ impl LineJudge {
         before: &Interpreter,
         number: u32,
         text: &str,
-    ) -> Result<(Interpreter, Vec<Item>), Refusal> {
+    ) -> Result<JudgedLine, Refusal> {
         let (mut tried, mut items) = (before.clone(), vec![]);
         tried.line(number, text.as_bytes(), &mut items)?;
         for item in &items {
@@ -85,8 +94,13 @@ impl LineJudge {
                 .map_err(|why| Refusal::of_planner(number, why))?;
         }
         items.retain(|item| !matches!(item, Item::End));
+        let ends = tried.ended();
         tried.go_on();
-        Ok((tried, items))
+        Ok(JudgedLine {
+            behind: tried,
+            items,
+            ends,
+        })
     }
 
     fn check(&self, item: &Item) -> Result<(), String> {

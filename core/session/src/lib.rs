@@ -13,4 +13,4 @@ pub mod operator;
 mod standing;
 
 pub use homing::{HOMING, Homing};
-pub use mdi::{MdiInput, MdiSession, NextLine};
+pub use mdi::{MdiInput, MdiSession, NextLine, Pace};

@@ -21,12 +21,15 @@ export function controls() {
   machine.link.on("away", () => text("echo", "–"));
   machine.link.on("refused", ({ why }) => say(why));
   machine.link.on("waits", ({ line }) => say(`The program waits at line ${line}.`));
-  at("lease").addEventListener("click", lease);
+  at("lease").addEventListener("click", () => {
+    const why = machine.mayAsk("lease") ? null : machine.refusal("lease");
+    if (why) say(why); else lease();
+  });
+  at("alarms").addEventListener("click", () => document.getElementById("tab-history").click());
   at("theme").addEventListener("click", () => {
-    const theme = document.documentElement.dataset.theme === "dark" ? "light" : "dark";
-    document.documentElement.dataset.theme = theme;
-    localStorage.setItem("theme", theme);
-    machine.tell("described", machine.described || { axes: [], machine: "", max_feed_ratio: 1 });
+    useTheme(theme.name === "dark" ? "light" : "dark");
+    localStorage.setItem("theme", theme.name);
+    machine.tell("theme");
   });
   at("next-action").addEventListener("click", act);
   // One button begins and goes on: what it would do stands on it.
@@ -105,11 +108,16 @@ function draw() {
   const [words, label, request] = status ? nextStep(status, machine.described)
     : [stranger ? strangerWords : "The controller does not answer. Trying again; nothing is sent meanwhile."];
   text("next", words || "");
-  step = request || null;
+  step = request && machine.mayAsk(request) ? request : null;
   at("next-action").hidden = !step;
   if (step) text("next-action", machine.hasLease ? label : `Take control · ${label}`);
-  text("lease", machine.hasLease ? "In control" : at("lease").dataset.how === "take-over" ? "Take it over" : "Take control");
-  at("lease").title = machine.hasLease ? "Press to give control back" : "One page controls the machine, all others look";
+  const mayControl = machine.mayAsk("lease");
+  at("lease").setAttribute("aria-disabled", String(!mayControl));
+  const alarms = status ? status.alarms.length : 0;
+  at("alarms").classList.toggle("none", alarms === 0);
+  text("alarms", alarms === 1 ? "1 alarm" : `${alarms} alarms`);
+  text("lease", !mayControl ? "Looks on" : machine.hasLease ? "In control" : at("lease").dataset.how === "take-over" ? "Take it over" : "Take control");
+  at("lease").title = !mayControl ? machine.refusal("lease") : machine.hasLease ? "Press to give control back" : "One page controls the machine, all others look";
   at("start").setAttribute("aria-disabled", machine.refusal(startRequest()) ? "true" : "false");
   at("start").title = machine.refusal(startRequest()) || "";
   text("start", startRequest() === "resume" ? "Resume" : "Start");

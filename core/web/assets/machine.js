@@ -3,6 +3,8 @@ import { Link } from "./link.js";
 import { say } from "./words.js";
 
 const STATUS_RATE_HZ = 25;
+// What a token allows, each what those before it allow.
+const ROLES = ["watch", "operate", "set-up"];
 // Requests that need no control lease.
 const FREE = new Set(["hold", "emergency-stop", "jog-stop"]);
 
@@ -11,21 +13,25 @@ export const machine = {
   described: null,
   status: null,
   hasLease: false,
-  listeners: { described: [], status: [], frame: [] },
+  role: "set-up",
+  listeners: { described: [], status: [], theme: [] },
 
   on(what, listener) { this.listeners[what].push(listener); },
   tell(what, told) { for (const listener of this.listeners[what]) listener(told); },
 
+  // Whether the token of this page allows a request at all.
+  mayAsk(request) {
+    const needed = this.described && this.described.roles ? this.described.roles[request] : null;
+    return !needed || ROLES.indexOf(this.role) >= ROLES.indexOf(needed);
+  },
+
   // Why a request would be refused now; null where it would not.
   refusal(request) {
     if (!this.link || !this.link.isOpen || !this.described) return "There is no connection to the controller.";
+    if (!this.mayAsk(request)) return this.role === "watch" ? "The token of this page lets it look, hold and stop, and nothing else." : "The token of this page does not let it change what lasts.";
     if (!FREE.has(request) && !this.hasLease) return "Take control first.";
     const why = (this.described.refused[this.status ? this.status.state : ""] || {})[request];
     return why ? why[0].toUpperCase() + why.slice(1) + "." : null;
-  },
-
-  knows(request) {
-    return Boolean(this.described && this.described.requests && this.described.requests.includes(request));
   },
 
   // Asks, and says what was refused; null then.
@@ -56,7 +62,8 @@ function token() {
 export function connect() {
   const link = new Link(token());
   machine.link = link;
-  link.on("greeting", async () => {
+  link.on("greeting", async ({ role }) => {
+    machine.role = ROLES.includes(role) ? role : "set-up";
     try {
       machine.described = await link.ask("machine");
       machine.tell("described", machine.described);

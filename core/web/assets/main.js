@@ -1,7 +1,9 @@
 import { connect, machine } from "./machine.js";
+import { capturePanel } from "./capture.js";
 import { controls } from "./controls.js";
 import { historyPanel, offsetsPanel, toolsPanel } from "./tables.js";
 import { jogPanel } from "./jog.js";
+import { machinePanel } from "./machine-panel.js";
 import { mdiPanel } from "./mdi.js";
 import { pathView } from "./path.js";
 import { programsPanel } from "./programs.js";
@@ -13,8 +15,8 @@ import { element } from "./words.js";
 
 const PANELS = [
   ["jog", "Jog", jogPanel], ["mdi", "By hand", mdiPanel], ["programs", "Programs", programsPanel],
-  ["offsets", "Offsets", offsetsPanel], ["tools", "Tools", toolsPanel], ["history", "History", historyPanel],
-  ["tuning", "Tuning", tuningPanel],
+  ["offsets", "Offsets", offsetsPanel], ["tools", "Tools", toolsPanel], ["history", "Alarms", historyPanel],
+  ["capture", "Scope", capturePanel], ["machine", "Machine", machinePanel], ["tuning", "Tuning", tuningPanel],
 ];
 
 function panels() {

@@ -70,23 +70,34 @@ export function toolsPanel() {
 
 export function historyPanel() {
   const list = element("ul", { class: "files" });
-  const alarms = element("ul", { class: "errors" });
+  const alarms = element("ul", { class: "alarms" });
+  const all = bind(element("button", { hidden: "" }, "Acknowledge all"), "acknowledge", () => machine.ask("acknowledge", {}));
   const fill = async () => {
     try {
       const told = await machine.link.ask("history", { count: 10 });
       list.replaceChildren(...(told.jobs.length ? told.jobs.map(job) : [element("li", { class: "hint" }, "Nothing was driven yet.")]));
-      alarms.replaceChildren(...told.alarms.map((alarm) => element("li", {}, alarm.text)));
+      alarms.replaceChildren(...(told.alarms.length ? told.alarms.map(alarmRow) : [element("li", { class: "hint" }, "There were none.")]));
+      all.hidden = !told.alarms.some((alarm) => alarm.acknowledged_unix_ms === null);
     } catch (error) { say(error.message); }
   };
   machine.on("described", fill);
   machine.link.on("job", fill);
   machine.link.on("state", fill);
-  return element("div", {}, element("h2", {}, "Jobs"), list, element("h2", {}, "Alarms"), alarms);
+  machine.link.on("alarm", fill);
+  return element("div", {}, element("h2", {}, "Alarms"), alarms, all, element("h2", {}, "Jobs"), list);
+}
+
+// An alarm stays until somebody says that it was seen; a reset does not say so.
+function alarmRow({ alarm, text, raised_unix_ms: raised, acknowledged_unix_ms: seen }) {
+  const when = element("small", {}, new Date(raised).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" }));
+  if (seen !== null) return element("li", { class: "seen" }, when, element("span", {}, text));
+  const button = bind(element("button", {}, "Acknowledge"), "acknowledge", () => machine.ask("acknowledge", { alarm }));
+  return element("li", {}, when, element("span", {}, text), button);
 }
 
 function job({ name, outcome, time_s, stops }) {
   const time = Number.isFinite(time_s) ? `${time_s.toFixed(1)} s` : "";
-  const words = outcome === "done" ? "" : outcome;
-  return element("li", { class: "row" }, element("span", { class: "grow" }, name), element("small", { class: ["fault", "emergency-stop", "lost"].includes(outcome) ? "bad" : null }, words),
+  const words = outcome === "done" ? "" : outcome || "is driven";
+  return element("li", { class: "row" }, element("span", { class: "grow name" }, name), element("small", { class: ["fault", "emergency-stop", "lost"].includes(outcome) ? "bad" : null }, words),
     element("small", {}, stops ? `${stops} stops` : ""), element("small", { style: "min-width: 58px; text-align: right" }, time));
 }

@@ -1,4 +1,4 @@
-//! The files of the page: in the binary of a release, and read from the source folder in a debug build.
+//! The files of the page, and under `view/` what it shares with the report: in the binary of a release, and read from the source folder in a debug build.
 
 use std::fmt::Write as _;
 
@@ -22,7 +22,11 @@ const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self' 'u
 pub fn answer(path: &str, headers: &HeaderMap) -> Response<Body> {
     let name = path.trim_start_matches('/');
     let name = if name.is_empty() { "index.html" } else { name };
-    let Some(file) = Assets::get(name) else {
+    let found = match name.strip_prefix("view/") {
+        Some(part) => tandem_view::file(part),
+        None => Assets::get(name),
+    };
+    let Some(file) = found else {
         return plain(StatusCode::NOT_FOUND, "there is no such file");
     };
     let mut tag = String::from("\"");

@@ -6,8 +6,16 @@ use std::sync::Arc;
 use axum::http::header::{HOST, ORIGIN, SEC_WEBSOCKET_PROTOCOL};
 use axum::http::{HeaderMap, HeaderName, Uri};
 
-/// Says whether a token opens the door. Thread of the server; waits for nothing.
-pub type Admits = Arc<dyn Fn(&str) -> bool + Send + Sync>;
+/// Says how a token opens the door; none where it does not. Thread of the server; waits for nothing.
+pub type Admits = Arc<dyn Fn(&str) -> Option<Entry> + Send + Sync>;
+
+/// How a page comes to the controller.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Entry {
+    /// What is said to the controller before the page says anything: a line, without its end. The page hears neither the greeting
+    /// before it nor its answer, but what follows: another greeting.
+    pub opening: Option<String>,
+}
 
 /// The name of the protocol that the page speaks, among those that a WebSocket offers.
 pub const PROTOCOL: &str = "tandem.2";
@@ -75,7 +83,7 @@ impl Doorkeeper {
     ///
     /// # Errors
     /// Why it is refused.
-    pub fn socket(&self, headers: &HeaderMap) -> Result<(), &'static str> {
+    pub fn socket(&self, headers: &HeaderMap) -> Result<Entry, &'static str> {
         let origin =
             only(headers, &ORIGIN).ok_or("the request names no origin, or more than one")?;
         if !origin
@@ -96,13 +104,10 @@ impl Doorkeeper {
     ///
     /// # Errors
     /// Why it is refused.
-    pub fn token(&self, digits: &str) -> Result<(), &'static str> {
-        let admitted = text_of(digits).is_some_and(|token| (self.admits)(&token));
-        if admitted {
-            Ok(())
-        } else {
-            Err("the token is another one: open the address that tandem serve has printed last")
-        }
+    pub fn token(&self, digits: &str) -> Result<Entry, &'static str> {
+        text_of(digits)
+            .and_then(|token| (self.admits)(&token))
+            .ok_or("the token is another one: open the address that tandem serve has printed last")
     }
 
     fn is_own(&self, host: &str) -> bool {
@@ -134,7 +139,11 @@ mod tests {
     fn keeper(port: u16, names: &[&str]) -> Doorkeeper {
         let names: Vec<String> = names.iter().map(ToString::to_string).collect();
         let address = SocketAddr::from(([127, 0, 0, 1], port));
-        Doorkeeper::new(address, &names, Arc::new(|token| token == "abc"))
+        Doorkeeper::new(
+            address,
+            &names,
+            Arc::new(|token| (token == "abc").then(Entry::default)),
+        )
     }
 
     fn headers(all: &[(HeaderName, &str)]) -> HeaderMap {
@@ -201,7 +210,7 @@ mod tests {
             ]))
         };
         let (own, right) = ("http://127.0.0.1:8080", "tandem.2, token.616263");
-        assert_eq!(with(own, right), Ok(()));
+        assert_eq!(with(own, right), Ok(Entry::default()));
         for origin in [
             "http://evil.example:8080",
             "null",
@@ -219,9 +228,7 @@ mod tests {
             "token.zz",
             "token.ä",
         ] {
-            if let Ok(()) = with(own, offered) {
-                panic!("{offered}");
-            }
+            assert!(with(own, offered).is_err(), "{offered}");
         }
         assert!(
             keeper

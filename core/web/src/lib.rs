@@ -11,5 +11,5 @@ mod bridge;
 mod judge;
 mod server;
 
-pub use judge::Admits;
+pub use judge::{Admits, Entry};
 pub use server::{Options, Server};

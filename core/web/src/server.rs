@@ -150,7 +150,7 @@ async fn token(State(room): State<Arc<Room>>, headers: HeaderMap) -> Response<Bo
         .and_then(|named| named.strip_prefix("Bearer "))
         .unwrap_or_default();
     match room.keeper.token(token) {
-        Ok(()) => assets::plain(StatusCode::OK, "the token opens"),
+        Ok(_) => assets::plain(StatusCode::OK, "the token opens"),
         Err(why) => assets::plain(StatusCode::FORBIDDEN, why),
     }
 }
@@ -160,9 +160,10 @@ async fn socket(
     headers: HeaderMap,
     upgrade: Result<WebSocketUpgrade, axum::extract::ws::rejection::WebSocketUpgradeRejection>,
 ) -> Response<Body> {
-    if let Err(why) = room.keeper.socket(&headers) {
-        return assets::plain(StatusCode::FORBIDDEN, why);
-    }
+    let entry = match room.keeper.socket(&headers) {
+        Ok(entry) => entry,
+        Err(why) => return assets::plain(StatusCode::FORBIDDEN, why),
+    };
     let Ok(upgrade) = upgrade else {
         return assets::plain(StatusCode::BAD_REQUEST, "this is the place of a WebSocket");
     };
@@ -177,7 +178,7 @@ async fn socket(
         .max_message_size(MAX_MESSAGE_BYTES)
         .max_frame_size(MAX_MESSAGE_BYTES)
         .on_upgrade(async move |page| {
-            bridge::carry(page, &room.controller).await;
+            bridge::carry(page, &room.controller, entry).await;
             drop(place);
         })
 }

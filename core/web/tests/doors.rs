@@ -10,12 +10,14 @@ use std::sync::mpsc::{Receiver, channel};
 use std::thread;
 use std::time::Duration;
 
-use tandem_web::{Options, Server};
+use tandem_web::{Entry, Options, Server};
 use tungstenite::client::IntoClientRequest;
 use tungstenite::http::HeaderValue;
 use tungstenite::{Message, WebSocket};
 
 const TOKEN: &str = "a token of sixteen";
+/// Whoever names it may do less.
+const WATCHING: &str = "a token to look with";
 const PATIENCE: Duration = Duration::from_secs(20);
 
 struct House {
@@ -54,10 +56,14 @@ impl House {
         let mut stream = TcpStream::connect(self.address()).unwrap();
         stream.set_read_timeout(Some(PATIENCE)).unwrap();
         stream.write_all(request.as_bytes()).unwrap();
-        let mut answer = Vec::new();
-        // A server that closes with unread bytes resets the connection behind its answer.
-        let _ = stream.read_to_end(&mut answer);
-        let answer = String::from_utf8_lossy(&answer).into_owned();
+        let (mut answer, mut bytes) = (String::new(), [0; 4096]);
+        // A server that closes with unread bytes resets the connection behind its answer, and one that would go on keeps it open.
+        while let Ok(count @ 1..) = stream.read(&mut bytes) {
+            answer += &String::from_utf8_lossy(&bytes[..count]);
+            if is_whole(&answer) {
+                break;
+            }
+        }
         let status = answer.split(' ').nth(1).and_then(|code| code.parse().ok());
         (
             status.unwrap_or_else(|| panic!("{request}: {answer}")),
@@ -98,11 +104,29 @@ impl House {
     }
 }
 
+/// Whether the answer has as many bytes as it says; one that says nothing ends with its connection.
+fn is_whole(answer: &str) -> bool {
+    let Some((head, body)) = answer.split_once("\r\n\r\n") else {
+        return false;
+    };
+    let length = head.lines().find_map(|line| {
+        let (name, value) = line.split_once(':')?;
+        let is_length = name.eq_ignore_ascii_case("content-length");
+        is_length.then(|| value.trim().parse::<usize>().unwrap())
+    });
+    length.is_some_and(|length| body.len() >= length)
+}
+
 fn start(address: &str, controller: &Path) -> Result<Server, String> {
     Server::start(Options {
         address: address.parse().unwrap(),
         names: vec![],
-        admits: Arc::new(|token| token == TOKEN),
+        admits: Arc::new(|token| {
+            let opening = (token == WATCHING).then(|| "{\"less\":true}".to_string());
+            [TOKEN, WATCHING]
+                .contains(&token)
+                .then_some(Entry { opening })
+        }),
         controller: controller.to_path_buf(),
     })
 }
@@ -181,6 +205,22 @@ fn the_token_is_asked_by_a_page_that_was_refused() {
         [200, 403, 403]
     );
     assert_eq!(house.get("/token", "").0, 403);
+}
+
+#[test]
+fn what_is_said_in_a_page_s_name_comes_before_what_the_page_says() {
+    let house = House::open();
+    let mut page = house.page(&house.own(), &offered(WATCHING)).unwrap();
+    page.send(Message::text("{\"id\":1}")).unwrap();
+    let mut controller = house.comers.recv_timeout(PATIENCE).unwrap();
+    controller.set_read_timeout(Some(PATIENCE)).unwrap();
+    controller
+        .write_all(b"{\"greeting\":1}\n{\"answer\":0}\n{\"greeting\":2}\n")
+        .unwrap();
+    let mut lines = BufReader::new(controller).lines();
+    assert_eq!(lines.next().unwrap().unwrap(), "{\"less\":true}");
+    assert_eq!(lines.next().unwrap().unwrap(), "{\"id\":1}");
+    assert_eq!(page.read().unwrap(), Message::text("{\"greeting\":2}"));
 }
 
 #[test]
@@ -321,6 +361,7 @@ fn the_files_of_the_page_are_small() {
             })
             .sum()
     }
-    let all = bytes(&Path::new(env!("CARGO_MANIFEST_DIR")).join("assets"));
+    let own = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let all = bytes(&own.join("assets")) + bytes(&own.join("../view/assets"));
     assert!(all <= 600_000, "{all} bytes");
 }

@@ -5,7 +5,7 @@ use thiserror::Error;
 
 use crate::drive::DriveDescription;
 pub use crate::esc::Clocking;
-use crate::faults::Fault;
+use crate::faults::BusFault;
 
 /// A bus: its devices in the order in which a frame meets them, what goes wrong, and when.
 #[derive(Clone, Debug, Default, Deserialize)]
@@ -16,7 +16,7 @@ pub struct BusDescription {
     pub devices: Vec<DeviceDescription>,
     /// What goes wrong.
     #[serde(default)]
-    pub faults: Vec<Fault>,
+    pub faults: Vec<BusFault>,
     /// Inputs of terminals that follow the position of a drive.
     #[serde(default)]
     pub switches: Vec<Switch>,

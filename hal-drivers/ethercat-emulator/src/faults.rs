@@ -7,7 +7,7 @@ use crate::al::{AlCode, AlState};
 /// One thing that goes wrong.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Fault {
+pub struct BusFault {
     /// When it begins.
     pub at: When,
     /// How long it lasts. A fault of the wire lasts for one frame unless stated, any other for ever.
@@ -122,6 +122,15 @@ pub enum What {
     SilentMailbox {
         /// The device.
         device: usize,
+    },
+    /// A device sends an emergency message before each of its next answers.
+    Emergencies {
+        /// The device.
+        device: usize,
+        /// So many of them.
+        messages: u32,
+        /// The code in them.
+        code: u16,
     },
     /// A drive goes into a fault.
     DriveFault {
@@ -266,6 +275,7 @@ impl What {
             | Self::RefuseState { device, .. }
             | Self::HangState { device, .. }
             | Self::SilentMailbox { device }
+            | Self::Emergencies { device, .. }
             | Self::DriveFault { device, .. }
             | Self::NeverEnables { device }
             | Self::DisablesItself { device }

@@ -33,7 +33,7 @@ pub use description::{
 };
 pub use device::Device;
 pub use drive::{Cut, DriveDescription, DriveState};
-pub use faults::{Fault, SdoRefusal, Span, What, When};
+pub use faults::{BusFault, SdoRefusal, Span, What, When};
 pub use firmware::Counters;
 pub use frame::{ETHERTYPE, is_ethercat};
 pub use raw_socket::{RawError, RawSocket};

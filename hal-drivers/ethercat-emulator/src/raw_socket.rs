@@ -36,6 +36,8 @@ pub enum RawError {
 pub struct RawSocket {
     socket: Socket,
     name: String,
+    /// The system's number of the interface: one that is made again under the same name has another.
+    index: u32,
 }
 
 impl RawSocket {
@@ -64,7 +66,13 @@ impl RawSocket {
         Ok(Self {
             socket,
             name: name.to_string(),
+            index,
         })
+    }
+
+    /// Whether the interface of this name is still the one that was opened: it may have gone, and been made again.
+    pub fn is_current(&self) -> bool {
+        name_to_index(&self.socket, &self.name) == Ok(self.index)
     }
 
     /// Whether frames can be sent and received now.

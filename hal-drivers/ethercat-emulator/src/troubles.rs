@@ -32,6 +32,9 @@ impl crate::device::Device {
         match what {
             What::Deaf { .. } => trouble.deaf = on,
             What::SilentMailbox { .. } => trouble.silent = on,
+            What::Emergencies { messages, code, .. } => {
+                trouble.emergencies = (if on { *messages } else { 0 }, *code);
+            }
             What::AlError { state, code, .. } if on => self.fall(*state, *code),
             What::RefuseState { state, code, .. } => {
                 trouble.refused.retain(|(refused, _)| refused != state);

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use crate::bus::{Bus, MAX_FRAME};
 use crate::description::{BusDescription, DescriptionError};
-use crate::faults::{Fault, Span, What, When};
+use crate::faults::{BusFault, Span, What, When};
 use crate::frame::is_ethercat;
 
 /// Replies that wait; a master that reads none loses the oldest.
@@ -26,7 +26,7 @@ pub struct Wire {
 
 #[derive(Clone, Debug)]
 struct Scheduled {
-    fault: Fault,
+    fault: BusFault,
     ends: Option<End>,
     state: Progress,
 }
@@ -111,7 +111,7 @@ impl Wire {
     ///
     /// # Errors
     /// What names a device that is not there, or cannot be built.
-    pub fn add(&mut self, fault: Fault) -> Result<(), DescriptionError> {
+    pub fn add(&mut self, fault: BusFault) -> Result<(), DescriptionError> {
         self.bus.judge_fault(&fault.what)?;
         let span = fault
             .lasts
@@ -126,7 +126,7 @@ impl Wire {
             ));
         }
         self.faults.push(Scheduled {
-            fault: Fault {
+            fault: BusFault {
                 lasts: span,
                 ..fault
             },
@@ -146,7 +146,7 @@ impl Wire {
         } else {
             When::Ms(self.bus.now_ns() as f64 / 1e6)
         };
-        self.add(Fault { at, lasts, what })?;
+        self.add(BusFault { at, lasts, what })?;
         self.advance(self.bus.now_ns());
         Ok(())
     }

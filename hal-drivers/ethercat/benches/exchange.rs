@@ -1,28 +1,68 @@
 //! What an exchange takes: `cargo bench -p tandem-ethercat`. An item is a fine period of 1 ms on virtual time, the emulated devices'
 //! own loops and all, so that thousands of items a second are × real time.
 //!
-//! Behind its table it prints how long an exchange takes beside a bare frame of the same bytes, one after the other in one run: on
-//! the emulator in this process, or at the interface that `TANDEM_BENCH_INTERFACE` names, with four drives behind it
-//! (and nothing else).
+//! Behind its table it prints how long an exchange takes beside a bare frame of the same bytes, in turn in one run: over a pair of
+//! virtual network interfaces with the emulator's command at its other end, which `cargo build --release -p
+//! tandem-ethercat-emulator` makes, and on the emulator in this process, where nothing is left of a frame but what devices do with
+//! it. `TANDEM_BENCH_INTERFACE` names another interface, with four drives behind it and nothing else.
 
 #![allow(clippy::format_push_string, reason = "options in pieces, once a rig")]
+
+#[path = "../tests/common/mod.rs"]
+mod common;
 
 use std::time::{Duration, Instant};
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use tandem_ethercat::{EthercatDrives, Options};
+use tandem_rig::{BUS_END, MASTER_END, program_beside, with_cable};
 use tandem_sdk::{Driver, DriverContext, Feedback, Name, PluginOptions, Setpoint};
 
 const CALLS: u32 = 1000;
 const PERIOD_S: f64 = 0.001;
-/// Exchanges that are timed beside a bare frame, and the pause before each.
+/// Drives of the bus on which an exchange is timed beside a bare frame, how often, and the pause before each.
+const DRIVES: usize = 4;
 const PAIRS: usize = 20_000;
 const PAUSE: Duration = Duration::from_micros(200);
+/// Names the interface at which that is done.
+const INTERFACE: &str = "TANDEM_BENCH_INTERFACE";
 
 fn main() {
+    if let Ok(interface) = std::env::var(INTERFACE) {
+        beside_a_bare_frame(&interface);
+        return;
+    }
     divan::main();
-    beside_a_bare_frame();
+    beside_a_bare_frame("emulated");
+    match over_a_cable() {
+        Ok(told) => print!("{told}"),
+        Err(why) => println!("over a cable: skipped: {why}"),
+    }
+}
+
+/// This bench once more, at one end of a cable with the emulator at the other.
+fn over_a_cable() -> Result<String, String> {
+    let emulator = program_beside("tandem-ethercat-emulator")?;
+    let bench = std::env::current_exe().map_err(|error| error.to_string())?;
+    let bus = std::env::temp_dir().join(format!("tandem-bench-{}.toml", std::process::id()));
+    std::fs::write(&bus, "[[devices]]\nkind = \"drive\"\n".repeat(DRIVES))
+        .map_err(|error| error.to_string())?;
+    let output = with_cable(&format!(
+        "$fast {emulator} {bus} --interface {BUS_END} > /dev/null & emulator=$!\n\
+         sleep 1; {INTERFACE}={MASTER_END} $fast {bench}; status=$?; kill $emulator; exit $status",
+        emulator = emulator.display(),
+        bus = bus.display(),
+        bench = bench.display(),
+    ));
+    // It is read by then.
+    let _ = std::fs::remove_file(&bus);
+    let output = output?;
+    if output.status.success() {
+        Ok(String::from_utf8_lossy(&output.stdout).into_owned())
+    } else {
+        Err(String::from_utf8_lossy(&output.stderr).into_owned())
+    }
 }
 
 /// A bus of so many drives in operation, all of them moving.
@@ -64,16 +104,8 @@ impl Rig {
         context.real_time = u32::from(real_time);
         driver.open(&context).unwrap();
         let attached = driver.start().unwrap();
-        let setpoint = Setpoint {
-            position: attached.position,
-            enable: 1,
-            ..Setpoint::default()
-        };
-        let feedback = Feedback {
-            position: attached.position,
-            state: attached.state,
-            ..Feedback::default()
-        };
+        let (mut setpoint, feedback) = common::begin(&attached);
+        setpoint.enable = 1;
         let mut rig = Self {
             driver,
             setpoint,
@@ -136,30 +168,36 @@ fn eight_drives(bencher: Bencher, sync: &str) {
 }
 
 /// An exchange and a bare frame, in turn, each behind the same pause; the times of each, sorted.
-fn beside_a_bare_frame() {
-    let interface =
-        std::env::var("TANDEM_BENCH_INTERFACE").unwrap_or_else(|_| "emulated".to_string());
-    let mut rig = Rig::new(&interface, "free-run", 4, 0, true);
-    let mut times = [vec![], vec![]];
+fn beside_a_bare_frame(interface: &str) {
+    let mut rig = Rig::new(interface, "free-run", DRIVES, 0, true);
+    let (mut times, mut lost) = ([vec![], vec![]], 0);
     for n in 0..2 * PAIRS {
         std::thread::sleep(PAUSE);
-        let begun = Instant::now();
-        if n % 2 == 0 {
+        let (before, begun) = (rig.driver.counters().lost, Instant::now());
+        let came = if n % 2 == 0 {
             rig.exchange();
+            true
         } else {
-            rig.driver.send_again();
+            rig.driver.send_again()
+        };
+        let took = begun.elapsed();
+        let came = came && rig.driver.counters().lost == before;
+        // How long each waits for a frame that does not come says nothing of a frame.
+        if came {
+            times[n % 2].push(took);
+        } else {
+            lost += 1;
         }
-        times[n % 2].push(begun.elapsed());
     }
     for times in &mut times {
         times.sort_unstable();
     }
-    for share in [0.5, 0.99] {
+    for share in [0.5, 0.9, 0.99] {
         let [exchange_us, frame_us] = times
             .each_ref()
             .map(|times| times[(times.len() as f64 * share) as usize].as_secs_f64() * 1e6);
         println!(
-            "{interface}, p{:.0}: exchange {exchange_us:.1} µs, bare frame {frame_us:.1} µs, {:.2} of it",
+            "{interface}, p{:.0}: exchange {exchange_us:.1} µs, bare frame {frame_us:.1} µs, {:.2} of it; {lost} lost",
             share * 100.0,
             exchange_us / frame_us
         );

@@ -6,6 +6,7 @@ use ethercrab::{DefaultLock, MainDevice, SubDeviceGroup};
 use crate::bring_up::MAX_BYTES;
 use crate::check::MAX_DEVICES;
 use crate::coe::Objects;
+use crate::requests::Request;
 use crate::survey::Value;
 
 /// Devices whose process data are mapped, in one of `ethercrab`'s types, with a clock or without.
@@ -26,23 +27,23 @@ impl std::fmt::Debug for Mailboxes {
 }
 
 impl Mailboxes {
-    /// Reads an object of the device at a place, as many bytes as it has.
-    pub(crate) async fn read(
+    /// Reads an object, as many bytes as it has, or writes it and reads it back.
+    pub(crate) async fn ask(
         &self,
         main: &MainDevice<'static>,
-        place: usize,
         called: &str,
-        (index, sub): (u16, u8),
+        request: &Request,
     ) -> Result<Value, String> {
         let refused = |error: ethercrab::error::Error| format!("{called}: {error}");
+        let place = request.object.place;
         match self {
             Self::FreeRun(group) => {
                 let device = &group.subdevice(main, place).map_err(refused)?;
-                Objects { device, called }.read_any(index, sub).await
+                Objects { device, called }.ask(request).await
             }
             Self::Clocks(group) => {
                 let device = &group.subdevice(main, place).map_err(refused)?;
-                Objects { device, called }.read_any(index, sub).await
+                Objects { device, called }.ask(request).await
             }
         }
     }
@@ -52,9 +53,17 @@ impl Mailboxes {
 mod tests {
     use crate::bus::Bus;
     use crate::options::Options;
-    use crate::survey::context_of;
+    use crate::survey::{Object, context_of};
     use tandem_ethercat_emulator::What;
     use tandem_sdk::PluginOptions;
+
+    fn object(place: usize, index: u16) -> Object {
+        Object {
+            place,
+            index,
+            sub: 0,
+        }
+    }
 
     /// Objects are read in operation within ten periods, while every exchange has its time and its reply.
     #[test]
@@ -75,7 +84,7 @@ mod tests {
             for n in 0..200_u64 {
                 let (begun, before_ns) = (bus.counters.exchanges, bus.link_mut().now_ns());
                 let place = (n % 4) as usize;
-                let value = bus.read_object(place, 0x6502, 0).unwrap();
+                let value = bus.read_object(object(place, 0x6502)).unwrap();
                 assert_eq!((value.number, value.bits), (0b1_1010_0100, 32));
                 let took = bus.counters.exchanges - begun;
                 worst = worst.max(took);
@@ -88,7 +97,7 @@ mod tests {
             }
             assert!(worst <= 10, "{sync}: {worst} periods");
             println!("{sync}: an object is read within {worst} periods");
-            let refused = bus.read_object(2, 0x5FFF, 0).unwrap_err();
+            let refused = bus.read_object(object(2, 0x5FFF)).unwrap_err();
             assert!(
                 refused.contains("device 2 (2): reading 5FFF:00: it refuses"),
                 "{refused}"
@@ -98,7 +107,7 @@ mod tests {
             let wire = bus.link_mut().wire_mut().unwrap();
             wire.inject(silent, None).unwrap();
             let (begun, before_ns) = (bus.counters.exchanges, bus.link_mut().now_ns());
-            let refused = bus.read_object(1, 0x6502, 0).unwrap_err();
+            let refused = bus.read_object(object(1, 0x6502)).unwrap_err();
             assert!(refused.contains("its mailbox does not answer"), "{refused}");
             let took = bus.counters.exchanges - begun;
             let passed = (bus.link_mut().now_ns() - before_ns) / 1_000_000;

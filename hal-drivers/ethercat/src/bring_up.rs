@@ -8,7 +8,7 @@ use tandem_sdk::DriverContext;
 
 use crate::beside::Mailboxes;
 use crate::check::MAX_DEVICES;
-use crate::coe::Objects;
+use crate::coe::{MAX_REPEATS, Objects, caught, may_pass};
 use crate::cyclic::{Area, Station};
 use crate::drive::{self, Constants, Drive, Moves};
 use crate::options::{DeviceOptions, MapBy, Options, Sync, object, pair};
@@ -83,12 +83,42 @@ pub(crate) struct Up {
     pub(crate) mailboxes: Mailboxes,
 }
 
-/// Brings a bus up.
+/// Why a bus does not come up.
+enum Refused {
+    /// In words.
+    For(String),
+    /// In words; the next attempt may find it otherwise.
+    ForNow(String),
+}
+
+impl From<String> for Refused {
+    fn from(words: String) -> Self {
+        Self::For(words)
+    }
+}
+
+/// Brings a bus up. What `ethercrab` itself asks the mailboxes cannot be asked again by itself, so all begins anew where a device
+/// said something else in between.
 pub(crate) async fn bring_up(
     main: &MainDevice<'static>,
     options: &Options,
     context: &DriverContext,
 ) -> Result<Up, String> {
+    let mut left = MAX_REPEATS;
+    loop {
+        match attempt(main, options, context).await {
+            Ok(up) => return Ok(up),
+            Err(Refused::ForNow(_)) if left > 0 => left -= 1,
+            Err(Refused::For(words) | Refused::ForNow(words)) => return Err(words),
+        }
+    }
+}
+
+async fn attempt(
+    main: &MainDevice<'static>,
+    options: &Options,
+    context: &DriverContext,
+) -> Result<Up, Refused> {
     let mut group: Group = main.init_single_group(time::now_ns).await.map_err(|error| {
         format!("the bus cannot be set up ({error}); is it powered, and the first cable at its input port?")
     })?;
@@ -134,10 +164,14 @@ pub(crate) async fn bring_up(
             }
         }
     }
-    let mapped = group
-        .into_pre_op_pdi(main)
-        .await
-        .map_err(|error| format!("the process data cannot be mapped: {error}"))?;
+    let mapped = caught(group.into_pre_op_pdi(main)).await.map_err(|error| {
+        let words = format!("the process data cannot be mapped: {error}");
+        if may_pass(&error) {
+            Refused::ForNow(words)
+        } else {
+            Refused::For(words)
+        }
+    })?;
     let mut ready = vec![];
     for (place, (index, address, drive)) in devices.into_iter().enumerate() {
         let station = areas(main, address)

@@ -1,5 +1,9 @@
 //! A bus that is up: one exchange in a period, and what is known of every device.
 
+use std::pin::Pin;
+use std::sync::Arc;
+use std::task::{Context, Poll, Waker};
+
 use tandem_ethercat_emulator::BusDescription;
 use tandem_sdk::{
     Attached, AxisVector, DriverContext, Feedback, JointState, MAX_AXES, MAX_DIGITAL, Setpoint,
@@ -14,7 +18,9 @@ use crate::link::Link;
 use crate::map::u16_at;
 use crate::master::Master;
 use crate::options::{EMULATED, Encoder, Options, Sync};
-use crate::survey::Value;
+use crate::requests::{Desk, Request};
+use crate::survey::{Object, Value};
+use crate::time;
 use crate::words::{al_code, al_state, own};
 
 /// Share of a period that a reply is waited for: what is left is the host's.
@@ -37,6 +43,14 @@ const SETTLE_EXCHANGES: u64 = 60;
 /// States of the bus.
 const OP: u16 = 8;
 const ERROR: u16 = 0x10;
+
+/// Objects that the driver tells its drives in every period: nobody else writes them.
+const OF_THE_DRIVER: [u16; 8] = [
+    0x6040, 0x6060, 0x6072, 0x607A, 0x60B1, 0x60B2, 0x60B8, 0x60FF,
+];
+
+/// What is asked of an object, on its way through the gaps between exchanges.
+type Job = Pin<Box<dyn Future<Output = Result<Value, String>> + Send>>;
 
 /// A device that takes part in the exchange.
 #[derive(Debug)]
@@ -84,12 +98,16 @@ pub(crate) struct Bus {
     context: DriverContext,
     link: Link,
     master: Option<Master>,
-    mailboxes: Option<Mailboxes>,
+    mailboxes: Option<Arc<Mailboxes>>,
+    job: Option<Job>,
+    answer: Option<Result<Value, String>>,
     cyclic: Option<Cyclic>,
     members: Vec<Member>,
     period_ns: u64,
     /// When the next exchange is due, where the driver itself keeps time.
     next_ns: u64,
+    /// When the last exchange began.
+    begun_ns: u64,
     asks: usize,
     last: Setpoint,
     phase_ns: Option<i64>,
@@ -117,10 +135,13 @@ impl Bus {
             link,
             master: Some(master),
             mailboxes: None,
+            job: None,
+            answer: None,
             cyclic: None,
             members: vec![],
             period_ns: (context.fine_period_s * 1e9).round() as u64,
             next_ns: 0,
+            begun_ns: 0,
             asks: 0,
             last: Setpoint::default(),
             phase_ns: None,
@@ -147,12 +168,13 @@ impl Bus {
         let master = master
             .as_mut()
             .ok_or_else(|| "the bus is closed".to_string())?;
+        link.renew(&options.interface)?;
         let up = master.run(link, |main| bring_up::bring_up(main, options, context))?;
         let stations: Vec<_> = up.devices.iter().map(|device| device.station).collect();
         let mut cyclic = Cyclic::new(&stations, up.reference)?;
         cyclic.ask(0);
         self.cyclic = Some(cyclic);
-        self.mailboxes = Some(up.mailboxes);
+        self.mailboxes = Some(Arc::new(up.mailboxes));
         let member = |ready: Ready| Member {
             inputs: vec![0; ready.station.inputs.bytes],
             ready,
@@ -260,6 +282,7 @@ impl Bus {
     /// Begins the exchange of a period: on virtual time, the period goes by first.
     pub(crate) fn send(&mut self, setpoint: &Setpoint) {
         if self.link.is_virtual() {
+            self.work(self.next_ns);
             self.link.wait_until(self.next_ns);
             self.steer();
         }
@@ -314,6 +337,7 @@ impl Bus {
 
     fn lay_out(&mut self, setpoint: &Setpoint) {
         self.last = *setpoint;
+        self.begun_ns = self.link.now_ns();
         let Some(cyclic) = &mut self.cyclic else {
             return;
         };
@@ -490,6 +514,9 @@ impl Bus {
         }
         self.members.clear();
         self.mailboxes = None;
+        if self.job.take().is_some() {
+            self.answer = Some(Err("the bus was stopped".to_string()));
+        }
     }
 
     /// Until when other frames may be on their way before the next exchange; none where it is due, or so near that they would not
@@ -500,28 +527,100 @@ impl Bus {
         (left_ns > quiet_ns).then_some(self.next_ns)
     }
 
-    /// Reads an object of the device at a place while process data go on. Soft side; it allocates.
-    pub(crate) fn read_object(
-        &mut self,
-        place: usize,
-        index: u16,
-        sub: u8,
-    ) -> Result<Value, String> {
-        let Some(called) = self.members.get(place).map(|m| m.ready.called.clone()) else {
-            return Err(format!(
+    fn called(&self, place: usize) -> Result<String, String> {
+        let member = self.members.get(place);
+        member.map(|m| m.ready.called.clone()).ok_or_else(|| {
+            format!(
                 "there is no device {place}: {} are on the bus, from 0",
                 self.members.len()
-            ));
-        };
-        let (Some(mut master), Some(mailboxes)) = (self.master.take(), self.mailboxes.take())
+            )
+        })
+    }
+
+    /// Reads an object of the device at a place, and exchanges meanwhile. Soft side; it allocates.
+    pub(crate) fn read_object(&mut self, object: Object) -> Result<Value, String> {
+        let called = self.called(object.place)?;
+        let (Some(mut master), Some(mailboxes)) = (self.master.take(), self.mailboxes.clone())
         else {
             return Err(format!("{called}: the bus is not in operation"));
         };
-        let value = master.run_beside(self, |main| {
-            mailboxes.read(main, place, &called, (index, sub))
-        });
-        (self.master, self.mailboxes) = (Some(master), Some(mailboxes));
+        let request = Request {
+            object,
+            value: None,
+        };
+        let value = master.run_beside(self, |main| mailboxes.ask(main, &called, &request));
+        self.master = Some(master);
         value
+    }
+
+    /// Asks for an object while another exchanges: [`Bus::work`] goes on with it, and [`Bus::take_answer`] has what comes of it.
+    /// Soft side; it allocates.
+    pub(crate) fn ask(&mut self, request: &Request) -> Result<(), String> {
+        let (called, request) = (self.called(request.object.place)?, *request);
+        let index = request.object.index;
+        if request.value.is_some() && OF_THE_DRIVER.contains(&index) {
+            return Err(format!(
+                "{called}: {index:04X} is the driver's own, which writes it in every period"
+            ));
+        }
+        if self.job.is_some() {
+            return Err(format!("{called}: another object is being asked for"));
+        }
+        let (Some(master), Some(mailboxes)) = (&self.master, self.mailboxes.clone()) else {
+            return Err(format!("{called}: the bus is not in operation"));
+        };
+        let main = Arc::clone(&master.main);
+        self.answer = None;
+        self.job = Some(Box::pin(async move {
+            mailboxes.ask(&main, &called, &request).await
+        }));
+        Ok(())
+    }
+
+    /// What came of the object that was asked for, once.
+    pub(crate) fn take_answer(&mut self) -> Option<Result<Value, String>> {
+        self.answer.take()
+    }
+
+    /// Whether an object is being asked for.
+    pub(crate) fn is_asked(&self) -> bool {
+        self.job.is_some()
+    }
+
+    /// Goes on with what is asked of an object, until so near the next exchange that no other frame would be back. Soft side, or
+    /// virtual time; it allocates.
+    fn work(&mut self, until_ns: u64) {
+        let quiet_ns = (self.period_ns as f64 * QUIET_SHARE) as u64;
+        let Some(mut job) = self.job.take() else {
+            return;
+        };
+        let mut context = Context::from_waker(Waker::noop());
+        loop {
+            time::set(self.link.now_ns());
+            if let Poll::Ready(answer) = job.as_mut().poll(&mut context) {
+                self.answer = Some(answer);
+                break;
+            }
+            let is_near = self.link.now_ns() + quiet_ns >= until_ns;
+            let Some(master) = self.master.as_mut().filter(|_| !is_near) else {
+                self.job = Some(job);
+                break;
+            };
+            master.turn(&mut self.link, until_ns);
+        }
+    }
+
+    /// The same on the wall clock, where the next exchange is due a period behind the last one. Nothing while its reply is on its
+    /// way.
+    pub(crate) fn work_beside(&mut self) {
+        if !self.sent {
+            self.work(self.begun_ns + self.period_ns);
+        }
+    }
+
+    /// Where other processes ask for objects; none where the bus is emulated.
+    pub(crate) fn desk(&self) -> Option<Desk> {
+        self.link.lock().and_then(Desk::at)
     }
 
     /// How every device is, for people who watch.

@@ -1,15 +1,22 @@
 //! Objects of a device, read and written by SDO.
 
 use ethercrab::error::{CoeAbortCode, Error, MailboxError};
+use std::future::poll_fn;
 use std::ops::Deref;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::pin::pin;
+use std::task::{Context, Poll};
 
 use ethercrab::{SubDevice, SubDeviceRef};
+use ethercrab_wire::WireError;
 
 use crate::map::{Entry, Map};
+use crate::requests::Request;
 use crate::survey::Value;
 
-/// How often an SDO is asked for again behind an emergency message, which `ethercrab` takes for its answer.
-const EMERGENCIES: u32 = 4;
+/// How often an SDO is asked for again behind an emergency message, which `ethercrab` takes for its answer, and behind a frame whose
+/// answer was late: `ethercrab` sends that again, and the device does not take what stands in its mailbox already.
+pub(crate) const MAX_REPEATS: u32 = 4;
 
 /// Most entries of a mapping that are read: 64 would be 256 bytes.
 const MAX_ENTRIES: u8 = 64;
@@ -20,25 +27,70 @@ pub(crate) struct Objects<'a, 'm, S = &'a SubDevice> {
     pub(crate) called: &'a str,
 }
 
-/// Asks again where an emergency message came in between.
+/// Asks again where an emergency message came in between, or the mailbox was taken.
 macro_rules! patiently {
     ($sdo:expr) => {{
-        let mut left = EMERGENCIES;
+        let mut left = MAX_REPEATS;
         loop {
-            match $sdo.await {
-                Err(Error::Mailbox(MailboxError::Emergency { .. })) if left > 0 => left -= 1,
+            match caught($sdo).await {
+                Err(error) if left > 0 && may_pass(&error) => left -= 1,
                 other => break other,
             }
         }
     }};
 }
 
+/// Whether the same question may be answered when it is asked again: something else came in between, the mailbox was taken, or
+/// the answer was that of a question that had been asked twice.
+pub(crate) fn may_pass(error: &Error) -> bool {
+    matches!(
+        error,
+        Error::Mailbox(MailboxError::Emergency { .. } | MailboxError::SdoResponseInvalid { .. })
+            | Error::WorkingCounter { .. }
+    )
+}
+
+/// An emergency message where an answer was awaited. Its code is gone with it; a drive's fault code is told by the drive's state.
+fn no_answer() -> Error {
+    Error::Mailbox(MailboxError::Emergency {
+        error_code: 0,
+        error_register: 0,
+    })
+}
+
+/// What `sdo` comes to. An emergency message that comes between the question and its answer is looked at by `ethercrab` (0.7.1) as if it
+/// were the answer: the low bits of its code make no command, or they do, and then an assertion fails. Both are told as the error that
+/// the lines behind that assertion would have made of it.
+pub(crate) async fn caught<T>(sdo: impl Future<Output = Result<T, Error>>) -> Result<T, Error> {
+    let mut sdo = pin!(sdo);
+    let look = |context: &mut Context<'_>| {
+        // Nothing of it is used again: what it has borrowed of the frames is given back as it is dropped.
+        let polled = catch_unwind(AssertUnwindSafe(|| sdo.as_mut().poll(context)));
+        match polled {
+            Ok(Poll::Ready(Err(Error::Wire(WireError::InvalidValue)))) => {
+                Poll::Ready(Err(no_answer()))
+            }
+            Ok(other) => other,
+            Err(panic) => {
+                let words = panic.downcast_ref::<String>();
+                if words.is_some_and(|words| words.contains("Emergency")) {
+                    Poll::Ready(Err(no_answer()))
+                } else {
+                    resume_unwind(panic)
+                }
+            }
+        }
+    };
+    poll_fn(look).await
+}
+
 impl<S: Deref<Target = SubDevice>> Objects<'_, '_, S> {
     fn failed(&self, doing: &str, index: u16, sub: u8, error: &Error) -> String {
         let why = match error {
             Error::Mailbox(MailboxError::Aborted { code, .. }) => format!("it refuses: {code}"),
-            Error::Mailbox(MailboxError::Emergency { error_code, .. }) => {
-                format!("it only sends emergency messages, the last with code {error_code:#06x}")
+            Error::Mailbox(MailboxError::Emergency { .. }) => {
+                "it sends an emergency message in place of each answer, or what is no answer"
+                    .to_string()
             }
             Error::Timeout(_) => "its mailbox does not answer".to_string(),
             other => other.to_string(),
@@ -71,6 +123,18 @@ impl<S: Deref<Target = SubDevice>> Objects<'_, '_, S> {
             }
         }
         Err(refused)
+    }
+
+    /// Does what is asked: reads an object, or writes it and reads it back.
+    pub(crate) async fn ask(&self, request: &Request) -> Result<Value, String> {
+        let (index, sub) = (request.object.index, request.object.sub);
+        let Some(value) = request.value else {
+            return self.read_any(index, sub).await;
+        };
+        let bytes = usize::from(value.bits / 8);
+        self.write_and_judge(index, sub, value.number, bytes)
+            .await?;
+        Ok(value)
     }
 
     /// Reads a number where the device has the object.

@@ -49,15 +49,15 @@ pub(crate) struct Station {
 
 /// A datagram in the frame: where its data begin, how many there are.
 #[derive(Clone, Copy, Debug)]
-struct Place {
+struct DataRange {
     data: usize,
     bytes: usize,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Datagrams {
-    outputs: Option<(Place, u16)>,
-    inputs: Option<(Place, u16)>,
+    outputs: Option<(DataRange, u16)>,
+    inputs: Option<(DataRange, u16)>,
 }
 
 /// What a device's state register held.
@@ -79,9 +79,9 @@ pub(crate) struct Cyclic {
     number: u32,
     devices: Vec<Datagrams>,
     stations: Vec<u16>,
-    clock: Option<Place>,
-    status: Place,
-    control: Place,
+    clock: Option<DataRange>,
+    status: DataRange,
+    control: DataRange,
     /// Device whose state is asked for in this period.
     asked: usize,
     /// Replies that were none of the frame that was waited for, since the start.
@@ -105,7 +105,7 @@ impl Cyclic {
             frame.extend([0, 0]);
             let data = frame.len();
             frame.resize(data + bytes + COUNTER, 0);
-            Place { data, bytes }
+            DataRange { data, bytes }
         };
         add(NOP, 0, 4);
         let clock = reference.map(|station| add(FRMW, register(station, SYSTEM_TIME), 8));
@@ -221,7 +221,7 @@ impl Cyclic {
         self.frame[self.control.data..self.control.data + 2].copy_from_slice(&state.to_le_bytes());
     }
 
-    fn counter(&self, place: Place) -> u16 {
+    fn counter(&self, place: DataRange) -> u16 {
         let at = place.data + place.bytes;
         u16::from_le_bytes([self.reply[at], self.reply[at + 1]])
     }

@@ -13,6 +13,8 @@ use tandem_sdk::{
 use crate::bus::{Bus, Counters};
 use crate::check;
 use crate::options::{EMULATED, Options, number};
+use crate::requests::{Desk, Request};
+use crate::survey::Value;
 use crate::words::joint_code;
 
 /// Periods without an exchange of the host's, after which the driver keeps its bus alive by itself, and the share of the devices'
@@ -22,6 +24,9 @@ const WATCHDOG_SHARE: f64 = 0.5;
 
 /// Longest time for which the thread that keeps the bus alive does not look whether it is to end.
 const MAX_NAP: Duration = Duration::from_millis(20);
+
+/// The same while somebody asks for an object: a few looks in a period.
+const NAP_AT_WORK: Duration = Duration::from_micros(200);
 
 /// A bus of drives and terminals behind the driver contract.
 ///
@@ -60,6 +65,21 @@ impl Shared {
     /// For the soft side: waits.
     fn bus(&self) -> MutexGuard<'_, Bus> {
         self.bus.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Goes on with objects that are asked for, where nobody has the bus; whether any is.
+    fn serve(&self, desk: Option<&mut Desk>) -> bool {
+        let Ok(mut bus) = self.bus.try_lock() else {
+            return true;
+        };
+        let is_served = desk.is_some_and(|desk| {
+            desk.look(&mut bus);
+            desk.is_busy()
+        });
+        if bus.is_asked() {
+            bus.work_beside();
+        }
+        is_served || bus.is_asked()
     }
 
     /// For the fine loop: the keeper has it for the time of one frame at most, and while the host is silent only.
@@ -112,6 +132,22 @@ impl EthercatDrives {
         shared.is_some_and(|shared| shared.bus().send_again())
     }
 
+    /// Asks for an object of a device while exchanges go on: it is read, or written and read back, in the gaps between them. On
+    /// the wall clock the thread that keeps the bus alive does it. Host; allocates.
+    ///
+    /// # Errors
+    /// There is no such device, another object is being asked for, or the object is one that the driver writes itself.
+    pub fn ask(&self, request: &Request) -> Result<(), String> {
+        let shared = self.shared.as_ref().filter(|_| self.running);
+        let shared = shared.ok_or_else(|| "the bus is not in operation".to_string())?;
+        shared.bus().ask(request)
+    }
+
+    /// What came of the object that was asked for, once it is there, and once. Host; allocates.
+    pub fn answer(&self) -> Option<Result<Value, String>> {
+        self.shared.as_ref()?.bus().take_answer()
+    }
+
     /// Looks into the emulated bus, and changes it: for tests. Nothing where it is another.
     pub fn with_emulator<T>(
         &mut self,
@@ -140,19 +176,23 @@ impl EthercatDrives {
             .name("ethercat".to_string())
             .spawn(move || {
                 ask_for_priority();
+                let mut desk = shared.bus().desk();
                 while !shared.ends.load(Ordering::Relaxed) {
                     let begun = Instant::now();
                     let heard_ns = shared.heard_ns.load(Ordering::Acquire);
                     let since_ns = shared.now_ns().saturating_sub(heard_ns);
                     if heard_ns > 0 && since_ns <= silent_ns {
+                        let at_work = shared.serve(desk.as_mut());
                         // Nothing is to be done before, and the fine loop has the computer for itself.
                         let left = Duration::from_nanos(silent_ns - since_ns);
-                        std::thread::sleep(left.clamp(period, MAX_NAP));
+                        let nap = left.clamp(period, MAX_NAP);
+                        std::thread::sleep(if at_work { NAP_AT_WORK } else { nap });
                         continue;
                     }
                     if let Ok(mut bus) = shared.bus.try_lock() {
                         bus.keep_alive();
                     }
+                    shared.serve(desk.as_mut());
                     std::thread::sleep(period.saturating_sub(begun.elapsed()));
                 }
             })

@@ -24,6 +24,7 @@ mod options;
 mod probe;
 mod reactions;
 mod recorder;
+mod requests;
 mod survey;
 mod time;
 mod words;
@@ -35,6 +36,7 @@ pub use options::{
     AnalogOptions, CodeOptions, DeviceOptions, Encoder, HomingOptions, MapBy, Mode, Options,
     ProbeOptions, ReactionOptions, SpindleMode, SpindleOptions, StartupOptions, Sync,
 };
+pub use requests::{Request, ask_whoever_drives};
 pub use survey::{Found, Object, State, Survey, Value, Watch, Watched, context_of, watch};
 
 /// Index and sub-index of an object as people write it, `0x6085` or `0x6099:1`. Any loop; does not allocate.

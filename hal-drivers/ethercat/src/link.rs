@@ -1,12 +1,11 @@
 //! What frames go over: a network interface, or the emulator in this process on virtual or real time.
 
-use std::io::ErrorKind;
-use std::os::linux::net::SocketAddrExt;
-use std::os::unix::net::{SocketAddr, UnixDatagram};
+use std::os::unix::net::UnixListener;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
 use crate::recorder::Recorder;
+use crate::requests::lock;
 use tandem_ethercat_emulator::{BusDescription, MAX_FRAME, RawSocket, Wire, is_ethercat};
 
 /// How long a wire is listened to before anything is sent: three cycles of another master that sends every 10 ms.
@@ -28,7 +27,7 @@ enum Medium {
     Interface {
         socket: RawSocket,
         buffer: Box<[u8; MAX_FRAME]>,
-        _lock: UnixDatagram,
+        lock: UnixListener,
     },
 }
 
@@ -55,7 +54,7 @@ impl Link {
         let medium = Medium::Interface {
             socket,
             buffer: Box::new([0; MAX_FRAME]),
-            _lock: lock,
+            lock,
         };
         let mut link = Self {
             medium,
@@ -63,12 +62,30 @@ impl Link {
             virtual_ns: 0,
             recorder: None,
         };
-        if let Medium::Interface { socket, .. } = &mut link.medium {
+        link.listen(name)?;
+        Ok(link)
+    }
+
+    /// Opens the interface once more where it has gone and another one has its name: an adapter that was pulled out and is back. Its
+    /// lock stays.
+    pub(crate) fn renew(&mut self, name: &str) -> Result<(), String> {
+        match &mut self.medium {
+            Medium::Interface { socket, .. } if !socket.is_current() => {
+                *socket = RawSocket::open(name).map_err(|error| error.to_string())?;
+            }
+            _ => return Ok(()),
+        }
+        self.listen(name)
+    }
+
+    /// Whether frames can be sent, and nobody else sends any.
+    fn listen(&mut self, name: &str) -> Result<(), String> {
+        if let Medium::Interface { socket, .. } = &mut self.medium {
             socket.judge().map_err(|error| error.to_string())?;
         }
         let mut frame = [0; MAX_FRAME];
-        let until_ns = link.now_ns() + LISTEN_NS;
-        while let Some(length) = link.receive(until_ns, &mut frame) {
+        let until_ns = self.now_ns() + LISTEN_NS;
+        while let Some(length) = self.receive(until_ns, &mut frame) {
             if is_ethercat(&frame[..length]) {
                 let [a, b, c, d, e, f] = std::array::from_fn(|byte| frame[6 + byte]);
                 return Err(format!(
@@ -77,7 +94,7 @@ impl Link {
                 ));
             }
         }
-        Ok(link)
+        Ok(())
     }
 
     /// Whether time is virtual.
@@ -96,6 +113,14 @@ impl Link {
         match &mut self.medium {
             Medium::Emulated(wire) => Some(wire),
             Medium::Interface { .. } => None,
+        }
+    }
+
+    /// What makes an interface this process's alone; none where the bus is emulated.
+    pub(crate) fn lock(&self) -> Option<&UnixListener> {
+        match &self.medium {
+            Medium::Emulated(_) => None,
+            Medium::Interface { lock, .. } => Some(lock),
         }
     }
 
@@ -183,16 +208,4 @@ impl Link {
             }
         }
     }
-}
-
-/// Takes an interface for this process alone, for as long as the socket lives. Its name is known in the network namespace of the
-/// interface and nowhere else, and nothing of it is left when a process is killed.
-fn lock(name: &str) -> Result<UnixDatagram, String> {
-    let address = SocketAddr::from_abstract_name(format!("tandem-ethercat-{name}"));
-    address
-        .and_then(|address| UnixDatagram::bind_addr(&address))
-        .map_err(|error| match error.kind() {
-            ErrorKind::AddrInUse => format!("another process drives the interface {name}"),
-            _ => format!("the lock of the interface {name}: {error}"),
-        })
 }

@@ -2,7 +2,7 @@
 //! for one of its futures.
 
 use std::pin::pin;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::task::{Context, Poll, Waker};
 use std::time::Duration;
 
@@ -24,7 +24,7 @@ const FRAME_BYTES: usize = PduStorage::element_size(1100);
 
 /// `ethercrab`, and both ends of what goes through it.
 pub(crate) struct Master {
-    pub(crate) main: MainDevice<'static>,
+    pub(crate) main: Arc<MainDevice<'static>>,
     ports: Ports,
     clocks: bool,
 }
@@ -65,7 +65,7 @@ impl Master {
             retry_behaviour: RetryBehaviour::Count(3),
         };
         Some(Self {
-            main: MainDevice::new(pdu_loop, timeouts, config),
+            main: Arc::new(MainDevice::new(pdu_loop, timeouts, config)),
             ports: Ports { tx, rx },
             clocks,
         })
@@ -96,6 +96,11 @@ impl Master {
             }
             ports.turn(link, u64::MAX);
         }
+    }
+
+    /// Sends what a future wants to be sent, and takes in what comes within a step, or until then.
+    pub(crate) fn turn(&mut self, link: &mut Link, until_ns: u64) {
+        self.ports.turn(link, until_ns);
     }
 
     /// Runs what `job` makes of the main device to its end, in the time that the exchanges of a bus leave.

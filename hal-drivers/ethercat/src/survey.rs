@@ -404,7 +404,7 @@ fn watched(bus: &mut Bus, objects: &[Object]) -> Vec<Watched> {
         .iter()
         .map(|object| {
             let Object { place, index, sub } = *object;
-            let told = match bus.read_object(place, index, sub) {
+            let told = match bus.read_object(*object) {
                 Ok(value) => format!("{index:04X}:{sub:02X} = {value}"),
                 Err(words) => words,
             };

@@ -1,12 +1,14 @@
 //! A bus that is attached again and again in one process: behind a fault, behind a cable that was pulled, for ever.
 
+mod common;
+
 use std::sync::{Mutex, PoisonError};
 
 use tandem_ethercat::{EthercatDrives, Options};
 use tandem_ethercat_emulator::What;
-use tandem_sdk::{
-    Attached, Driver, DriverContext, Feedback, JointState, Name, PluginOptions, Setpoint,
-};
+use tandem_sdk::{Driver, DriverContext, Feedback, JointState, Name, PluginOptions, Setpoint};
+
+use common::begin;
 
 /// Memory is that of the process: one test at a time.
 static ALONE: Mutex<()> = Mutex::new(());
@@ -22,20 +24,6 @@ fn driver(sync: &str) -> (EthercatDrives, DriverContext) {
     context.joints[0].name = Name::new("x");
     let driver = EthercatDrives::new(&Options::read(&text).unwrap()).unwrap();
     (driver, context)
-}
-
-/// Where a host begins behind a start.
-fn begin(attached: &Attached) -> (Setpoint, Feedback) {
-    let setpoint = Setpoint {
-        position: attached.position,
-        ..Setpoint::default()
-    };
-    let feedback = Feedback {
-        position: attached.position,
-        state: attached.state,
-        ..Feedback::default()
-    };
-    (setpoint, feedback)
 }
 
 /// Exchanges until the joint is in a state; fails after 2 s.

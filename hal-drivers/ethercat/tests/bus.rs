@@ -1,5 +1,7 @@
 //! The driver against the emulator, exchange by exchange on virtual time.
 
+mod common;
+
 use proptest::prelude::*;
 use tandem_ethercat::{EthercatDrives, Options};
 use tandem_ethercat_emulator::{AlCode, AlState, DriveState, What};
@@ -48,15 +50,7 @@ impl Rig {
     fn with(mut driver: EthercatDrives, context: &DriverContext) -> Self {
         driver.open(context).unwrap();
         let attached = driver.start().unwrap();
-        let setpoint = Setpoint {
-            position: attached.position,
-            ..Setpoint::default()
-        };
-        let feedback = Feedback {
-            position: attached.position,
-            state: attached.state,
-            ..Feedback::default()
-        };
+        let (setpoint, feedback) = common::begin(&attached);
         Self {
             driver,
             setpoint,

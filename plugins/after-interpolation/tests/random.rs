@@ -101,7 +101,7 @@ fn filtered(filter: &str, tau_s: f64, h: f64, blocks: &[Block], count: usize) ->
 fn config() -> ProptestConfig {
     let seeds = FileFailurePersistence::WithSource("regressions");
     ProptestConfig {
-        cases: 96,
+        cases: 48,
         failure_persistence: Some(Box::new(seeds)),
         ..ProptestConfig::default()
     }

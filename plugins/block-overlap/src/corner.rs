@@ -1,5 +1,7 @@
 //! The junction of two blocks: what tolerance and turning allow there, in closed form.
 
+use tandem_sdk::MAX_AXES;
+
 use crate::entry::Entry;
 use crate::options::LimitMode;
 use crate::rules::{ARC_OVERLAP, Rules, TURN_SHARE, greater, lesser};
@@ -45,6 +47,13 @@ impl Corner {
         if rest {
             return blank;
         }
+        if leaves_travel(rules, before, after) {
+            return Self {
+                rest: true,
+                tight: true,
+                ..blank
+            };
+        }
         let (turn, squares) = rules.turn(&before.directions[1], &after.directions[0]);
         let span_mm = if rules.controlled {
             span_mm(rules, before, after, squares)
@@ -53,7 +62,7 @@ impl Corner {
         };
         if rules.limits == LimitMode::Off {
             let fastest = greater(before.feed_mm_per_s, after.feed_mm_per_s);
-            let ticks = most_ticks(span_mm / (fastest * rules.tick_s));
+            let ticks = max_ticks(span_mm / (fastest * rules.tick_s));
             if ticks < 1.0 {
                 return Self {
                     rest: true,
@@ -115,10 +124,31 @@ impl Corner {
     }
 }
 
+/// Beyond an end by less than this is rounding, mm.
+const ROUNDED_MM: f64 = 1e-9;
+
+/// Whether the two blocks together may be beyond an end of the travel, where neither is alone. While they overlap, what is still
+/// to go of the first comes on top of what is gone of the second: so an axis that turns back there may go further than either.
+fn leaves_travel(rules: &Rules, before: &Entry, after: &Entry) -> bool {
+    (0..rules.axes.min(MAX_AXES)).any(|axis| {
+        let [low, high] = [rules.travel_mm[0][axis], rules.travel_mm[1][axis]];
+        let (at, [first, second]) = (
+            before.end[axis],
+            [before, after].map(|it| it.extent_mm(axis)),
+        );
+        // An end that one of them goes beyond by itself is none: travel counts for nothing before homing.
+        let above =
+            first[1] + (second[1] - at) > greater(high, greater(first[1], second[1])) + ROUNDED_MM;
+        let below =
+            first[0] + (second[0] - at) < lesser(low, lesser(first[0], second[0])) - ROUNDED_MM;
+        above || below
+    })
+}
+
 /// The longest overlap where the axes do not count, in whole ticks; zero where none is short enough. `span` is the greatest
 /// F·τ that the tolerance allows, in ticks of travel. The chord between two samples lies inside the corner by its n-th part
 /// of a tick: `n + 1/n ≤ span`.
-fn most_ticks(span: f64) -> f64 {
+fn max_ticks(span: f64) -> f64 {
     if span < 2.0 {
         0.0
     } else {

@@ -208,6 +208,24 @@ impl Entry {
         self.feed_mm_per_s = lesser(feed, turning);
     }
 
+    /// The least and the greatest position of `axis` on its path, mm.
+    pub fn extent_mm(&self, axis: usize) -> [f64; 2] {
+        let (start, end) = (self.start[axis], self.end[axis]);
+        let [mut low, mut high] = [lesser(start, end), greater(start, end)];
+        if let Some(arc) = &self.arc {
+            let bend = arc.path.curvature(0.0);
+            let size = bend.0.iter().map(|b| b * b).sum::<f64>().sqrt();
+            // Along the axis of a helix there is no curvature, and an arc in the plane has some in both of its axes or in one.
+            if arc.path.max_curvature()[axis] > 0.0 {
+                let radius_mm = arc.path.radius_mm();
+                let middle = start + bend[axis] / size * radius_mm;
+                low = lesser(low, middle - radius_mm);
+                high = greater(high, middle + radius_mm);
+            }
+        }
+        [low, high]
+    }
+
     /// Whether nothing moves.
     pub fn is_dwell(&self) -> bool {
         self.kind == BlockKind::Dwell

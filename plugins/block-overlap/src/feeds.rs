@@ -96,9 +96,9 @@ impl Plan {
     /// with full overlap wherever it can be, and once with no block above the feed that its neighbours left it: a late start
     /// that saved a higher one may not be worth it then. The fastest plan stays.
     fn improve(&mut self, rules: &Rules, ring: &Ring, tau_s: f64) {
-        let mut least_s = self.time_s(rules, ring, tau_s);
+        let mut min_s = self.time_s(rules, ring, tau_s);
         for round in 0..ROUNDS {
-            if self.lost_s <= MUCH * least_s {
+            if self.lost_s <= MUCH * min_s {
                 return;
             }
             self.reach.clear();
@@ -116,8 +116,8 @@ impl Plan {
             } else {
                 f64::INFINITY
             };
-            if time_s < least_s {
-                least_s = time_s;
+            if time_s < min_s {
+                min_s = time_s;
             } else {
                 self.swap();
                 self.lost_s = lost_s;

@@ -172,11 +172,11 @@ pub fn late_overlap_s(rules: &Rules, corner: &Corner, blocks: [&Entry; 2], ramp_
     // Arcs ask for more the longer the overlap: bent · o².
     let bent = bent_share(blocks, 1.0);
     let bounded_s = |ramp_s: f64, spare: f64| {
-        let most_s = lesser(longest_s, ramp_s);
-        if bent * most_s * most_s > spare {
+        let max_s = lesser(longest_s, ramp_s);
+        if bent * max_s * max_s > spare {
             (spare / bent).sqrt()
         } else {
-            most_s
+            max_s
         }
     };
     // A right angle between two axes takes all of both, to rounding.

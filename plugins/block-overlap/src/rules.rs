@@ -32,6 +32,8 @@ pub struct Rules {
     pub axes: usize,
     /// Per axis 1/acceleration, s²/mm; zero where limits are off.
     pub per_acceleration: AxisVector,
+    /// The ends of the travel per entry of `axes`, mm; infinite for joints.
+    pub travel_mm: [AxisVector; 2],
     /// Highest axis speeds in feed and in rapid motion, mm/s.
     pub axis_mm_per_s: [AxisVector; 2],
     /// Per axis what a unit counts in path deviation: mm as they are, rotary axes in degrees, joints not at all.
@@ -59,6 +61,7 @@ impl Rules {
                 if i < axes.len() { of(i) } else { other }
             }))
         };
+        let count = context.axes.count();
         let acceleration = |i: usize| AIM * axes[i].acceleration_mm_per_s2;
         let unlimited = options.limits == LimitMode::Off;
         let controlled = options.corner_control == CornerControl::On;
@@ -83,6 +86,28 @@ impl Rules {
             } else {
                 each(&|i| 1.0 / acceleration(i), 0.0)
             },
+            travel_mm: [
+                each(
+                    &|i| {
+                        if i < count {
+                            axes[i].min_mm
+                        } else {
+                            f64::NEG_INFINITY
+                        }
+                    },
+                    f64::NEG_INFINITY,
+                ),
+                each(
+                    &|i| {
+                        if i < count {
+                            axes[i].max_mm
+                        } else {
+                            f64::INFINITY
+                        }
+                    },
+                    f64::INFINITY,
+                ),
+            ],
             axis_mm_per_s: [
                 each(&|i| axes[i].feed_mm_per_s, 0.0),
                 each(&|i| axes[i].rapid_mm_per_s, 0.0),

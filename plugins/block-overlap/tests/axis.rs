@@ -236,11 +236,11 @@ fn assert_overlaps_as_stated(overlaps_s: &[f64], blocks: &[Block], seed: u64) {
     for (index, pair) in blocks.windows(2).enumerate() {
         let stated = pair[0].time_constant_s;
         let stated_s = if stated.is_nan() { 0.05 } else { stated };
-        let most_s = (stated_s / PERIOD_S).round().max(1.0) * PERIOD_S;
+        let max_s = (stated_s / PERIOD_S).round().max(1.0) * PERIOD_S;
         let overlap_s = overlaps_s[index + 1];
         assert!(
-            overlap_s <= most_s + 1e-9,
-            "seed {seed}: {overlap_s} s after block {index} with TA {most_s} s"
+            overlap_s <= max_s + 1e-9,
+            "seed {seed}: {overlap_s} s after block {index} with TA {max_s} s"
         );
     }
 }

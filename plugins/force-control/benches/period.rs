@@ -17,14 +17,7 @@ fn main() {
 #[divan::bench]
 fn fine_period_of_three_axes(bencher: Bencher<'_, '_>) {
     let axes = Axes::new(&[('X', false), ('Y', false), ('Z', false)]).unwrap();
-    let context = StrategyContext {
-        axis_count: 3,
-        axes,
-        fine_period_s: 1e-3,
-        rough_period_s: 8e-3,
-        max_feed_ratio: 2.0,
-        joints_are_axes: 1,
-    };
+    let context = StrategyContext::new(axes, 1e-3, 8e-3, 2.0);
     let options = ["x", "y", "z"]
         .iter()
         .fold(OPTIONS.to_string(), |text, axis| {

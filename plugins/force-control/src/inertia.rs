@@ -61,20 +61,20 @@ impl Rls {
 pub struct Differences {
     span: usize,
     period_s: f64,
-    least_speed_rad_per_s: f64,
+    min_speed_rad_per_s: f64,
     /// The last 3·span + 1 angles and the currents of the periods that end at them, newest first.
     rows: Vec<(f64, f64)>,
     seen: usize,
 }
 
 impl Differences {
-    /// Differences over `span` periods; samples near a reversal, below `least_speed_rad_per_s`, are left out: Coulomb friction
+    /// Differences over `span` periods; samples near a reversal, below `min_speed_rad_per_s`, are left out: Coulomb friction
     /// changes its sign there. Allocates; [`Differences::push`] does not.
-    pub fn new(span: usize, period_s: f64, least_speed_rad_per_s: f64) -> Self {
+    pub fn new(span: usize, period_s: f64, min_speed_rad_per_s: f64) -> Self {
         Self {
             span,
             period_s,
-            least_speed_rad_per_s,
+            min_speed_rad_per_s,
             rows: vec![(0.0, 0.0); 3 * span + 1],
             seen: 0,
         }
@@ -91,6 +91,11 @@ impl Differences {
         }
         let acceleration = self.acceleration(0) - self.acceleration(self.span);
         Some((acceleration, self.current_a(0) - self.current_a(self.span)))
+    }
+
+    /// Begins anew where samples are missing.
+    pub fn restart(&mut self) {
+        self.seen = 0;
     }
 
     fn acceleration(&self, ago: usize) -> f64 {
@@ -123,6 +128,6 @@ impl Differences {
         let first = speed(0);
         [0, self.span, 2 * self.span]
             .iter()
-            .any(|i| speed(*i) * first.signum() < self.least_speed_rad_per_s)
+            .any(|i| speed(*i) * first.signum() < self.min_speed_rad_per_s)
     }
 }

@@ -76,8 +76,8 @@ impl FeedLaw {
                 wanted
             }
             Law::Ratio { exponent } => {
-                let least_nm = MIN_SHARE * self.bounds.reference_nm;
-                let factor = (self.bounds.reference_nm / torque_nm.max(least_nm)).powf(exponent);
+                let min_nm = MIN_SHARE * self.bounds.reference_nm;
+                let factor = (self.bounds.reference_nm / torque_nm.max(min_nm)).powf(exponent);
                 self.feed_mm_per_s * if may_rise { factor } else { factor.min(1.0) }
             }
         };

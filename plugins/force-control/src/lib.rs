@@ -31,6 +31,7 @@ pub mod friction;
 pub mod guard;
 pub mod inertia;
 pub mod law;
+pub mod learning;
 pub mod mean;
 pub mod observer;
 pub mod options;

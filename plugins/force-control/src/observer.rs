@@ -68,6 +68,27 @@ impl Observer {
         self.prepare(eta, speed_rad_per_s);
     }
 
+    /// Goes on with another inertia from `speed_rad_per_s`, with the estimate as it is.
+    pub fn set_inertia(
+        &mut self,
+        inertia_kg_m2: f64,
+        torque_constant_nm_per_a: f64,
+        (period_s, time_constant_s): (f64, f64),
+        speed_rad_per_s: f64,
+    ) {
+        let (estimate_nm, begun) = (self.estimate_nm, self.begun);
+        *self = Self::new(
+            inertia_kg_m2,
+            torque_constant_nm_per_a,
+            period_s,
+            time_constant_s,
+        );
+        self.estimate_nm = estimate_nm;
+        if begun {
+            self.restart(speed_rad_per_s);
+        }
+    }
+
     /// Multiplies everything remembered: the observer is linear.
     pub(crate) fn scale(&mut self, factor: f64) {
         self.next_eta *= factor;
@@ -102,6 +123,22 @@ mod tests {
             last = speed;
             assert!((observer.step(speed, current) - expected).abs() < 1e-13);
         }
+    }
+
+    #[test]
+    fn another_inertia_is_no_torque() {
+        let mut observer = Observer::new(1.842e-4, 0.378, 1e-3, 5e-3);
+        // A ramp of 100 rad/s² with half of the inertia that it takes.
+        let ramp = |observer: &mut Observer, from: i32| {
+            let steps = from..from + 200;
+            steps.fold(0.0, |_, k| {
+                observer.step(0.1 * f64::from(k), 3.684e-4 * 100.0 / 0.378)
+            })
+        };
+        assert!((ramp(&mut observer, 0) - 1.842e-2).abs() < 1e-6);
+        observer.set_inertia(3.684e-4, 0.378, (1e-3, 5e-3), 19.9);
+        assert!((observer.estimate_nm() - 1.842e-2).abs() < 1e-6);
+        assert!(ramp(&mut observer, 200).abs() < 1e-6);
     }
 
     #[test]

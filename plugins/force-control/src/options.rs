@@ -76,6 +76,8 @@ tandem_sdk::options! {
         pub teeth: Option<u32> = None,
         /// The axes that take the cutting force, by letter: a table of each; required.
         pub axes: BTreeMap<String, AxisOptions> = BTreeMap::new(),
+        /// What is learned of the axes while they run in air.
+        pub learning: LearningOptions = LearningOptions::default(),
         /// What the loop is, for the check at the start.
         pub stability: StabilityOptions = StabilityOptions::default(),
     }
@@ -111,6 +113,24 @@ pub struct Confidence {
     pub friction_rms_nm: f64,
 }
 
+/// What is learned while the axes run in air.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct LearningOptions {
+    /// The proportion of an axis' friction to its model.
+    pub friction: bool,
+    /// The inertia of an axis.
+    pub inertia: bool,
+    /// What is left of a rough period's weight in the next: 0.998 forgets over 500 of them.
+    pub friction_forgetting: f64,
+    /// What is left of the weight of an acceleration in the next fine sample that has one.
+    pub inertia_forgetting: f64,
+    /// Torque of an axis, beyond its friction, below which it runs in air, as a share of that friction.
+    pub air_share_of_friction: f64,
+    /// The inertia of the first axis is a signal too.
+    pub inertia_signal: bool,
+}
+
 /// The loop around the law.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -138,6 +158,19 @@ impl Default for AxisOptions {
             inertia_kg_m2: None,
             friction: FrictionModel::default(),
             confidence: Confidence::default(),
+        }
+    }
+}
+
+impl Default for LearningOptions {
+    fn default() -> Self {
+        Self {
+            friction: true,
+            inertia: true,
+            friction_forgetting: 0.998,
+            inertia_forgetting: 0.999,
+            air_share_of_friction: 0.4,
+            inertia_signal: false,
         }
     }
 }
@@ -172,7 +205,7 @@ impl Options {
             self.check_control()?;
         }
         self.check_estimate(context)?;
-        match self.mode {
+        match self.mode() {
             Mode::Control => self.check_stability(context),
             Mode::Observe => Ok(()),
         }
@@ -226,12 +259,26 @@ impl Options {
             1e4,
         )?;
         within("teeth", f64::from(self.teeth.unwrap_or(1)), 1.0, 100.0)?;
+        self.learning.check()?;
         if self.axes.is_empty() {
             return Err(refusal("axes", "no axis is listed"));
         }
         self.axes
             .iter()
             .try_for_each(|(letter, axis)| axis.check(letter, context))
+    }
+
+    /// What is done with the torque: a law without any gain observes.
+    pub fn mode(&self) -> Mode {
+        let idle = match self.law() {
+            Law::Proportional { gain } => gain == 0.0,
+            Law::Pi {
+                gain,
+                integral_gain,
+            } => gain == 0.0 && integral_gain == 0.0,
+            Law::Ratio { exponent } => exponent == 0.0,
+        };
+        if idle { Mode::Observe } else { self.mode }
     }
 
     /// Torque to be held, N·m; of checked options. Zero where it is only observed and none is stated.
@@ -310,6 +357,8 @@ impl Options {
             mean_samples: window(per_rough, tooth),
             tooth_period_s,
             latency: 1,
+            delay_periods: context.delay_periods as usize,
+            led: true,
         }
     }
 }
@@ -360,7 +409,7 @@ impl AxisOptions {
             0.0,
             1e3,
         )?;
-        let least_speed = if friction.stribeck_nm > 0.0 {
+        let min_speed = if friction.stribeck_nm > 0.0 {
             1e-6
         } else {
             0.0
@@ -368,7 +417,7 @@ impl AxisOptions {
         within(
             &name("friction.stribeck_speed_rad_per_s"),
             friction.stribeck_speed_rad_per_s,
-            least_speed,
+            min_speed,
             1e6,
         )?;
         within(
@@ -382,6 +431,30 @@ impl AxisOptions {
             self.confidence.inertia_percent,
             0.0,
             MAX_INERTIA_DOUBT_PERCENT,
+        )
+    }
+}
+
+impl LearningOptions {
+    fn check(&self) -> Result<(), PluginError> {
+        let name = |key: &str| format!("learning.{key}");
+        within(
+            &name("friction_forgetting"),
+            self.friction_forgetting,
+            0.9,
+            1.0,
+        )?;
+        within(
+            &name("inertia_forgetting"),
+            self.inertia_forgetting,
+            0.9,
+            1.0,
+        )?;
+        within(
+            &name("air_share_of_friction"),
+            self.air_share_of_friction,
+            0.0,
+            1.0,
         )
     }
 }

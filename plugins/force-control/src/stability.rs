@@ -1,7 +1,7 @@
 //! Whether a feed law is stable: the loop, linearised and driven from a disturbance.
 //!
-//! The loop is servo, screw, chip (the path driven within a tooth period), observer, mean, law and the rough period that passes
-//! before a ratio acts. Its growth over many rough periods is the spectral radius of what maps one rough period to the next.
+//! The loop is servo, screw, chip (the path driven within a tooth period), observer, mean, law, the rough period that passes
+//! before a ratio acts, the one in which the feed is led over to it, and the delay of the bus. Its growth over many rough periods is the spectral radius of what maps one rough period to the next.
 
 use std::f64::consts::TAU;
 
@@ -44,6 +44,10 @@ pub struct LoopModel {
     pub tooth_period_s: f64,
     /// Rough periods before the feed asked for acts: 1 in Tandem.
     pub latency: usize,
+    /// Fine periods by which the loop is late: a setpoint on its way to the drive, and what is measured on its way back.
+    pub delay_periods: usize,
+    /// The feed goes evenly to what is asked for, over a rough period, as in Tandem; else it steps there, as published.
+    pub led: bool,
 }
 
 impl LoopModel {
@@ -52,7 +56,7 @@ impl LoopModel {
     pub fn growth(&self, law: Law, torque_per_feed: f64, reference_nm: f64) -> f64 {
         let (gain, integral_gain) = linear_gains(law, torque_per_feed, reference_nm);
         let mut state = State::new(self);
-        let mut feeds = vec![0.0_f64; self.latency + 1];
+        let mut feeds = vec![0.0_f64; self.latency + 2];
         let (mut integral, mut log_scale) = (0.0, 0.0);
         let mut levels = Vec::with_capacity(SETTLE + MEASURED);
         for block in 0..SETTLE + MEASURED {
@@ -64,7 +68,12 @@ impl LoopModel {
             } else {
                 integral - gain * torque
             };
-            state.rough_period(self, feeds[self.latency], torque_per_feed);
+            let from = if self.led {
+                self.latency + 1
+            } else {
+                self.latency
+            };
+            state.rough_period(self, [feeds[from], feeds[self.latency]], torque_per_feed);
             let size = feeds
                 .iter()
                 .fold(integral.abs(), |most, feed| most.max(feed.abs()));
@@ -136,6 +145,8 @@ struct State {
     current: f64,
     driven: Vec<f64>,
     at: usize,
+    /// Speeds and currents on their way, the newest first.
+    measured: Vec<(f64, f64)>,
 }
 
 impl State {
@@ -166,17 +177,23 @@ impl State {
             current: 0.0,
             driven: vec![0.0; steps],
             at: 0,
+            measured: vec![(0.0, 0.0); model.delay_periods + 1],
         }
     }
 
-    fn rough_period(&mut self, model: &LoopModel, feed: f64, torque_per_feed: f64) {
+    /// A rough period in which the feed goes evenly from one to the other.
+    fn rough_period(&mut self, model: &LoopModel, [from, to]: [f64; 2], torque_per_feed: f64) {
         let turns = TAU / model.lead_mm;
         let gain = model.inertia_kg_m2 * TAU * model.velocity_loop_hz;
         let steps = (model.fine_period_s / STEP_S).round().max(1.0) as usize;
         let step_s = model.fine_period_s / steps as f64;
-        for _ in 0..model.per_rough {
+        for period in 1..=model.per_rough {
+            let feed = from + (to - from) * period as f64 / model.per_rough as f64;
             self.command += feed * model.fine_period_s * turns;
-            self.mean.push(self.observer.step(self.speed, self.current));
+            self.measured.rotate_right(1);
+            self.measured[0] = (self.speed, self.current);
+            let (speed, current) = self.measured[model.delay_periods];
+            self.mean.push(self.observer.step(speed, current));
             let error = model.position_gain_per_s * (self.command - self.angle) - self.speed;
             self.integral += gain / model.velocity_integral_s * model.fine_period_s * error;
             let torque = gain * error + self.integral;
@@ -211,6 +228,9 @@ impl State {
             *value *= scale;
         }
         self.driven.iter_mut().for_each(|driven| *driven *= scale);
+        for (speed, current) in &mut self.measured {
+            (*speed, *current) = (*speed * scale, *current * scale);
+        }
     }
 }
 

@@ -1,11 +1,11 @@
 //! The strategy: samples of a rough period in, a feed ratio out.
 
 use tandem_sdk::{
-    Answer, Axes, FeedStrategy, FineSample, MAX_SIGNALS, PluginError, Request, StrategyContext,
-    Window,
+    Answer, Axes, FeedStrategy, FineSample, MAX_AXES, MAX_SIGNALS, PluginError, Request,
+    StrategyContext, Window, Words,
 };
 
-use crate::axis::AxisLoad;
+use crate::axis::{AxisLoad, Sampling};
 use crate::conversion::resultant_nm;
 use crate::engagement::{Engagement, Tool};
 use crate::guard::Guard;
@@ -14,13 +14,14 @@ use crate::mean::window;
 use crate::options::{Mode, Options};
 
 /// Names of the signals, in the order of [`Answer::signals`].
-const SIGNALS: [&str; 6] = [
+const SIGNALS: [&str; 7] = [
     "torque_nm",
     "reference_nm",
     "force_n",
     "asked_feed_mm_per_min",
-    "asked_ratio",
     "tool",
+    "friction_ratio",
+    "inertia_kg_m2",
 ];
 
 /// The value of the signal `tool` in the rough period in which the guard trips.
@@ -39,6 +40,8 @@ pub struct ForceControl {
     law: FeedLaw,
     limit: RateLimit,
     guard: Guard,
+    /// Torque of the last sample, N·m.
+    now_nm: f64,
     engagement: Engagement,
     per_rough: f64,
     fine_period_s: f64,
@@ -48,9 +51,18 @@ pub struct ForceControl {
     holding: u32,
     /// Highest feed from which a cut may begin after the guard has tripped, mm/s.
     entry_cap_mm_per_s: f64,
+    /// Highest torque of the rough period in which the guard tripped last, N·m.
+    tripped_nm: f64,
     /// Feeds asked for and not yet in force, the one in force last.
     asked_mm_per_s: [f64; 3],
     programmed_mm_per_s: f64,
+    /// The operator's feed override where it is above 1: it raises the programmed feed that the law begins from.
+    raised: f64,
+    /// The same as the law heard it last.
+    law_raised: f64,
+    /// All axes run in air, as far as the rough period before said.
+    in_air: bool,
+    rapid: bool,
 }
 
 /// What a window says beside the torques.
@@ -60,6 +72,8 @@ struct Motion {
     feed_mm_per_s: f64,
     spindle_rad_per_s: f64,
     tripped: bool,
+    /// Highest torque of its samples, N·m.
+    max_nm: f64,
 }
 
 impl ForceControl {
@@ -79,13 +93,18 @@ impl ForceControl {
                 .next()
                 .and_then(|c| index_of(&context.axes, c))
         };
-        let time_constant_s = options.observer_time_constant_ms * 1e-3;
+        let sampling = Sampling {
+            period_s: context.fine_period_s,
+            time_constant_s: options.observer_time_constant_ms * 1e-3,
+            delay_periods: context.delay_periods,
+            lag_s: 1.0 / options.stability.position_gain_per_s,
+        };
         let axes = options.axes.iter().filter_map(|(letter, axis)| {
             Some(AxisLoad::new(
                 index(letter)?,
                 axis,
-                context.fine_period_s,
-                time_constant_s,
+                &options.learning,
+                sampling,
             ))
         });
         let bounds = options.bounds();
@@ -94,6 +113,7 @@ impl ForceControl {
             axes: axes.collect(),
             law: FeedLaw::new(options.law(), bounds, bounds.min_mm_per_s),
             limit: RateLimit::new(step_mm_per_s, bounds.min_mm_per_s),
+            now_nm: 0.0,
             guard: Guard::new(options.guard_torque_nm(), options.guard_samples),
             engagement: Engagement::new(options.air_torque_nm()),
             per_rough: (context.rough_period_s / context.fine_period_s).round(),
@@ -102,8 +122,13 @@ impl ForceControl {
             last_tick: None,
             holding: 0,
             entry_cap_mm_per_s: f64::INFINITY,
+            tripped_nm: 0.0,
             asked_mm_per_s: [0.0; 3],
             programmed_mm_per_s: 0.0,
+            raised: 1.0,
+            law_raised: 1.0,
+            in_air: false,
+            rapid: false,
             options,
         }
     }
@@ -114,6 +139,8 @@ impl ForceControl {
         if programmed.is_finite() && programmed > 0.0 {
             self.programmed_mm_per_s = programmed;
         }
+        self.rapid = programmed.is_infinite();
+        self.raised = sample.feed_override.max(1.0);
         // What is old says nothing of this period: the observers go on behind it, as where a sample is missing.
         if !sample.is_new() {
             return false;
@@ -123,13 +150,14 @@ impl ForceControl {
             .replace(sample.tick)
             .is_some_and(|last| sample.tick == last + 1);
         for axis in &mut self.axes {
-            axis.step(sample, follows);
+            axis.step(sample, follows, self.in_air);
         }
         let now_nm = resultant_nm(
             self.axes
                 .iter()
                 .map(|axis| (axis.torque_nm, axis.force_per_torque_per_m)),
         );
+        self.now_nm = now_nm;
         self.guard.trips(now_nm)
     }
 
@@ -137,11 +165,26 @@ impl ForceControl {
         let mut motion = Motion::default();
         for sample in samples {
             motion.tripped |= self.sample(sample);
+            motion.max_nm = motion.max_nm.max(self.now_nm);
             motion.feed_mm_per_s += sample.feed_mm_per_s / samples.len() as f64;
             motion.spindle_rad_per_s = sample.spindle_rad_per_s;
         }
+        self.learn(samples.iter().all(FineSample::is_new));
         self.hold(&mut motion);
         motion
+    }
+
+    /// What the rough period that ends says of friction and inertia, where it was heard whole.
+    fn learn(&mut self, whole: bool) {
+        let mut means = [[0.0; 3]; MAX_AXES];
+        for (axis, means) in self.axes.iter_mut().zip(&mut means) {
+            *means = axis.end_period();
+        }
+        let rapid = self.rapid;
+        self.in_air = whole && self.axes.iter().all(|axis| axis.is_in_air(rapid));
+        for (axis, means) in self.axes.iter_mut().zip(means) {
+            axis.learn(self.in_air, means);
+        }
     }
 
     /// One hold for one event: the torque swings while the axes stop.
@@ -156,9 +199,10 @@ impl ForceControl {
             self.holding -= 1;
         } else if motion.tripped {
             self.holding = LONGEST_HOLD;
+            self.tripped_nm = motion.max_nm;
             // Resumed in the same material, the torque is to be the reference.
-            self.entry_cap_mm_per_s =
-                motion.feed_mm_per_s * bounds.reference_nm / self.options.guard_torque_nm();
+            let torque_nm = motion.max_nm.max(self.options.guard_torque_nm());
+            self.entry_cap_mm_per_s = motion.feed_mm_per_s * bounds.reference_nm / torque_nm;
         }
     }
 
@@ -182,14 +226,19 @@ impl ForceControl {
 
     /// The feed to ask for, mm/s.
     fn target(&mut self, motion: &Motion, torque_nm: f64) -> f64 {
-        let programmed = self.programmed_mm_per_s;
+        let entered = self.programmed_mm_per_s;
+        let programmed = self.raised * entered;
+        let changed = std::mem::replace(&mut self.law_raised, self.raised) != self.raised;
         let in_force = self.asked_mm_per_s[2];
-        let moving = motion.feed_mm_per_s > 0.01 * in_force.min(programmed);
-        let stated = |feed: Option<f64>| feed.map_or(programmed, |mm_per_min| mm_per_min / 60.0);
+        let moving = motion.feed_mm_per_s > 0.01 * in_force.min(entered);
+        let stated = |feed: Option<f64>, unstated: f64| feed.map_or(unstated, |feed| feed / 60.0);
         let bounds = self.options.bounds();
-        let entry = stated(self.options.entry_feed_mm_per_min).min(self.entry_cap_mm_per_s);
-        let entry = entry.clamp(bounds.min_mm_per_s, bounds.max_mm_per_s);
-        self.law.set_max(self.max_ratio * programmed);
+        // An override does not make a tool enter faster than programmed.
+        let entry = stated(self.options.entry_feed_mm_per_min, entered);
+        let entry = entry
+            .min(self.entry_cap_mm_per_s)
+            .clamp(bounds.min_mm_per_s, bounds.max_mm_per_s);
+        self.law.set_max(self.max_ratio * entered);
         if self.engagement.update(moving, torque_nm) {
             let feed = entry.min(motion.feed_mm_per_s);
             self.law.restart(programmed, torque_nm, feed);
@@ -206,9 +255,14 @@ impl ForceControl {
             Tool::Entering => entry,
             Tool::Air => {
                 self.entry_cap_mm_per_s = f64::INFINITY;
-                stated(self.options.air_feed_mm_per_min)
+                stated(self.options.air_feed_mm_per_min, programmed)
             }
             Tool::Cutting => {
+                if changed {
+                    // A step of the operator's is none of the cut: the law goes on from what it asks for.
+                    let feed_mm_per_s = self.law.feed_mm_per_s();
+                    self.law.restart(programmed, torque_nm, feed_mm_per_s);
+                }
                 let may_rise = motion.feed_mm_per_s >= DRIVEN_SHARE * in_force;
                 self.law.next(programmed, torque_nm, may_rise)
             }
@@ -219,14 +273,23 @@ impl ForceControl {
     fn observed(&mut self, motion: &Motion, torque_nm: f64) -> Answer {
         self.engagement
             .update(motion.feed_mm_per_s > 0.0, torque_nm);
-        Answer::of_ratio(1.0).with_signals(&[
+        let asked = (self.programmed_mm_per_s, self.engagement.tool.number());
+        Answer::of_ratio(1.0).with_signals(&self.signals_of(torque_nm, asked))
+    }
+
+    /// The signals beside the feed asked for, mm/s, and where the tool is.
+    fn signals_of(&self, torque_nm: f64, (feed_mm_per_s, tool): (f64, f64)) -> [f64; MAX_SIGNALS] {
+        let learned = self.axes.first().map_or((1.0, 0.0), AxisLoad::learned);
+        [
             torque_nm,
             self.options.reference_nm(),
             self.force_n(torque_nm),
-            self.programmed_mm_per_s * 60.0,
-            1.0,
-            self.engagement.tool.number(),
-        ])
+            feed_mm_per_s * 60.0,
+            tool,
+            learned.0,
+            learned.1,
+            0.0,
+        ]
     }
 
     /// The cutting force in the direction of the first axis, N.
@@ -237,7 +300,7 @@ impl ForceControl {
 
     fn answer(&mut self, motion: &Motion) -> Answer {
         let torque_nm = self.mean_nm(motion.spindle_rad_per_s);
-        if self.options.mode == Mode::Observe {
+        if self.options.mode() == Mode::Observe {
             return self.observed(motion, torque_nm);
         }
         let target = self.target(motion, torque_nm);
@@ -252,22 +315,11 @@ impl ForceControl {
             1.0
         };
         self.asked_mm_per_s = [feed, self.asked_mm_per_s[0], self.asked_mm_per_s[1]];
-        let force_n = self.force_n(torque_nm);
         let tool = if motion.tripped {
             TRIPPED
         } else {
             self.engagement.tool.number()
         };
-        let mut signals = [0.0; MAX_SIGNALS];
-        let values = [
-            torque_nm,
-            bounds.reference_nm,
-            force_n,
-            feed * 60.0,
-            ratio,
-            tool,
-        ];
-        signals[..values.len()].copy_from_slice(&values);
         Answer {
             ratio,
             request: if motion.tripped {
@@ -275,7 +327,7 @@ impl ForceControl {
             } else {
                 Request::None
             },
-            signals,
+            signals: self.signals_of(torque_nm, (feed, tool)),
         }
     }
 }
@@ -287,7 +339,23 @@ fn index_of(axes: &Axes, letter: char) -> Option<usize> {
 
 impl FeedStrategy for ForceControl {
     fn signals(&self) -> &'static [&'static str] {
-        &SIGNALS
+        // A trace has room for 8 with those of the driver.
+        if self.options.learning.inertia_signal {
+            &SIGNALS
+        } else {
+            &SIGNALS[..6]
+        }
+    }
+
+    fn explain(&self) -> Words {
+        let (max_nm, level_nm) = (self.tripped_nm, self.options.guard_torque_nm());
+        Words::new(format!(
+            "{max_nm:.4} N·m is above the guard's {level_nm:.4} N·m"
+        ))
+    }
+
+    fn takes_override(&self) -> bool {
+        self.options.mode() == Mode::Control
     }
 
     fn update(&mut self, window: &Window) -> Result<Answer, PluginError> {

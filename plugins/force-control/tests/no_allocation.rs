@@ -12,14 +12,7 @@ const OPTIONS: &str = "reference_torque_nm = 0.1\nmin_feed_mm_per_min = 10\nmax_
 
 #[test]
 fn updates_do_not_allocate() {
-    let context = StrategyContext {
-        axis_count: 1,
-        axes: Axes::new(&[('X', false)]).unwrap(),
-        fine_period_s: 1e-3,
-        rough_period_s: 8e-3,
-        max_feed_ratio: 2.0,
-        joints_are_axes: 1,
-    };
+    let context = StrategyContext::new(Axes::new(&[('X', false)]).unwrap(), 1e-3, 8e-3, 2.0);
     let mut strategy = tandem_force_control::PLUGIN
         .feed_strategy(OPTIONS, &context)
         .unwrap();

@@ -47,6 +47,8 @@ pub struct Buffer {
     first: usize,
     dirty: usize,
     end: usize,
+    /// The last block whose start the cap alone bounds: no block that comes raises it, nor those before.
+    capped: usize,
     /// Whether the slot at `end` holds a block whose end junction is not known yet.
     open: bool,
     /// Square of what the last block itself allows.
@@ -66,6 +68,7 @@ impl Buffer {
             first: 0,
             dirty: 0,
             end: 0,
+            capped: 0,
             open: false,
             last_own: 0.0,
         }
@@ -86,6 +89,7 @@ impl Buffer {
         self.first = 0;
         self.dirty = 0;
         self.end = 0;
+        self.capped = 0;
         self.open = false;
     }
 
@@ -157,6 +161,20 @@ impl Buffer {
         })
     }
 
+    /// Whether there is room for blocks that may raise the end of the first one, which is frozen when it is taken.
+    pub fn would_gain(&mut self) -> bool {
+        if self.is_full() || self.len() == 0 || self.is_final() {
+            return false;
+        }
+        self.update();
+        !self.is_final()
+    }
+
+    /// Whether no block that may come raises the end of the first one.
+    fn is_final(&self) -> bool {
+        self.first < self.capped || self.is_settled()
+    }
+
     /// What is known of a block that was taken.
     pub fn entry(&self, taken: &Taken) -> &Entry {
         &self.entries[taken.number & self.mask]
@@ -191,7 +209,11 @@ impl Buffer {
         let mut next = 0.0;
         for number in (self.first + 1..self.end).rev() {
             let node = &mut self.nodes[number & self.mask];
-            let reach = lesser(node.cap, node.transfer.apply(next));
+            let from_end = node.transfer.apply(next);
+            let reach = lesser(node.cap, from_end);
+            if node.cap <= from_end {
+                self.capped = self.capped.max(number);
+            }
             if number < dirty && reach <= node.reach {
                 break;
             }

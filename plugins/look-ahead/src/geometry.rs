@@ -3,7 +3,7 @@
 use tandem_motion::Path;
 use tandem_sdk::{AxisVector, Block, BlockKind, JointLanes, LimitedBy};
 
-use crate::rows::{Rows, least_ratio, lesser};
+use crate::rows::{Rows, lesser, min_ratio};
 
 /// A block with everything that does not change while feeds are raised.
 #[derive(Clone, Debug)]
@@ -48,7 +48,7 @@ pub struct FeedCaps<'a> {
     /// The joints that are sums of axes, where there are any.
     pub joint_lanes: Option<&'static JointLanes>,
     /// Most blocks a second: the fine loop looks at a bounded number of segments a period.
-    pub most_blocks_per_s: f64,
+    pub max_blocks_per_s: f64,
 }
 
 impl Entry {
@@ -105,8 +105,8 @@ impl Entry {
             .iter()
             .zip(&most.0)
             .map(|(v, most)| (*v, *most));
-        let buffer = path.length_mm() * caps.most_blocks_per_s;
-        self.feed_mm_per_s = lesser(least_ratio(lesser(command, policy), axes), buffer);
+        let buffer = path.length_mm() * caps.max_blocks_per_s;
+        self.feed_mm_per_s = lesser(min_ratio(lesser(command, policy), axes), buffer);
         self.feed_reason = match self.feed_mm_per_s {
             feed if feed >= command || block.kind == BlockKind::Rapid => LimitedBy::Feed,
             feed if feed >= policy => LimitedBy::Policy,

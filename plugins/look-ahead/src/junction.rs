@@ -11,7 +11,7 @@ use tandem_sdk::{AxisLimits, AxisVector};
 
 use crate::geometry::Entry;
 use crate::options::Junction;
-use crate::rows::{Least, Row, Transfer, least_ratio, lesser};
+use crate::rows::{Least, Row, Transfer, lesser, min_ratio};
 
 /// Planners stay this far inside the limits.
 const MARGIN: f64 = 0.999;
@@ -80,7 +80,7 @@ impl Rule {
             .iter()
             .zip(step.0.map(f64::abs))
             .filter(|(_, step)| *step > STRAIGHT);
-        least_ratio(
+        min_ratio(
             most,
             stepping.map(|(axis, step)| (MARGIN * axis.speed_difference_mm_per_s, step)),
         )

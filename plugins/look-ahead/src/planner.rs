@@ -25,7 +25,7 @@ pub struct LookAhead {
     context: PlannerContext,
     options: Options,
     rule: Rule,
-    most_blocks_per_s: f64,
+    max_blocks_per_s: f64,
     feed_axis_mm_per_s: Vec<f64>,
     rapid_axis_mm_per_s: Vec<f64>,
     buffer: Buffer,
@@ -55,7 +55,7 @@ impl LookAhead {
         let axes = context.limits.axes();
         Ok(Self {
             context: *context,
-            most_blocks_per_s: BLOCKS_PER_FINE_PERIOD / context.fine_period_s,
+            max_blocks_per_s: BLOCKS_PER_FINE_PERIOD / context.fine_period_s,
             rule: Rule::new(options.junction, axes, context.fine_period_s),
             feed_axis_mm_per_s: axes.iter().map(|a| a.feed_mm_per_s).collect(),
             rapid_axis_mm_per_s: axes.iter().map(|a| a.rapid_mm_per_s).collect(),
@@ -164,7 +164,7 @@ impl Planner for LookAhead {
             feed_ratio: self.context.max_feed_ratio,
             axis_mm_per_s: axes,
             joint_lanes: self.context.joint_lanes,
-            most_blocks_per_s: self.most_blocks_per_s,
+            max_blocks_per_s: self.max_blocks_per_s,
         };
         self.buffer
             .push(&self.rule, |entry| entry.set(block, &caps));
@@ -182,7 +182,15 @@ impl Planner for LookAhead {
         sink: &mut dyn SegmentSink,
     ) -> Result<Advanced, PluginError> {
         let mut emitted_s = 0.0;
+        let had_room = !self.buffer.is_full();
         while emitted_s < duration_s {
+            // A block that a full buffer could end faster waits for it, so that its end does not depend on how much is asked for at
+            // once, nor on when blocks come.
+            let between = !self.driving && !self.writer.is_dwelling();
+            let waits = had_room || emitted_s > 0.0;
+            if waits && between && !self.finished && self.buffer.would_gain() {
+                break;
+            }
             match self.emit(duration_s - emitted_s, sink) {
                 Some(part_s) => emitted_s += part_s,
                 None => break,

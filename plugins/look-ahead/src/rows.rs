@@ -46,12 +46,12 @@ impl Rows {
 
     /// Path acceleration that is left when the square of the speed is `w`, mm/s².
     pub fn acceleration(&self, w: f64) -> f64 {
-        least_ratio(f64::INFINITY, self.iter().map(|r| (r.a - w * r.k, r.h)))
+        min_ratio(f64::INFINITY, self.iter().map(|r| (r.a - w * r.k, r.h)))
     }
 
     /// Square of the highest speed, up to `most`, inside a block of `length_mm` whose ends have the mean square `mean`.
     pub fn peak(&self, mean: f64, length_mm: f64, most: f64) -> f64 {
-        least_ratio(
+        min_ratio(
             most,
             self.iter()
                 .map(|r| (r.h * mean + length_mm * r.a, r.h + length_mm * r.k)),
@@ -119,7 +119,7 @@ impl Least {
 
 /// The least of `most` and the ratios `n/d`.
 #[inline]
-pub fn least_ratio(most: f64, ratios: impl Iterator<Item = (f64, f64)>) -> f64 {
+pub fn min_ratio(most: f64, ratios: impl Iterator<Item = (f64, f64)>) -> f64 {
     let mut least = Least::new(most);
     ratios.for_each(|ratio| least.and(ratio));
     least.value()
@@ -187,7 +187,7 @@ mod tests {
     }
 
     fn turning_cap(rows: &Rows, most: f64) -> f64 {
-        least_ratio(most, rows.iter().map(Row::turning_cap))
+        min_ratio(most, rows.iter().map(Row::turning_cap))
     }
 
     proptest! {

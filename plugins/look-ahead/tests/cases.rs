@@ -191,3 +191,87 @@ fn rough_records_and_fine_increments() {
             .unwrap()
     );
 }
+
+/// Junction feeds of the published insertion with a buffer of `count` blocks, mm/s: when a block starts, its end is as fast as
+/// its start, its junction and the rest at the end of the buffer allow.
+fn of_published_insertion(caps: &[f64], lengths_mm: &[f64], a: f64, count: usize) -> Vec<f64> {
+    let mut feeds = vec![0.0_f64];
+    for block in 0..lengths_mm.len() {
+        let last = (block + count).min(lengths_mm.len());
+        let mut reach = 0.0_f64;
+        for junction in (block + 1..last).rev() {
+            let square = (reach * reach + 2.0 * a * lengths_mm[junction]).sqrt();
+            reach = if junction == last {
+                0.0
+            } else {
+                square.min(caps[junction])
+            };
+        }
+        let forward = (feeds[block].powi(2) + 2.0 * a * lengths_mm[block]).sqrt();
+        feeds.push(reach.min(forward));
+    }
+    feeds
+}
+
+#[test]
+fn small_buffers_of_blocks_shorter_than_a_fine_period_are_the_published_insertion() {
+    let mut random = tandem_rig::Random::from_the_clock();
+    let (fine_s, a) = (1e-3, 355.0);
+    for case in 0..24 {
+        let buffer = random.pick(&[2, 3, 10]);
+        let (mut at, mut heading) = ([0.0_f64; 2], 0.0_f64);
+        let mut points = vec![AxisVector::ZERO];
+        for _ in 0..120 {
+            // At 83 mm/s a fine period is 0.083 mm.
+            let length_mm = if random.below(10) == 0 {
+                random.between(0.1, 5.0)
+            } else {
+                random.between(0.004, 0.07)
+            };
+            heading += random.between(-0.2, 0.2);
+            at = [
+                at[0] + length_mm * heading.cos(),
+                at[1] + length_mm * heading.sin(),
+            ];
+            points.push(AxisVector::from_slice(&at));
+        }
+        let blocks = lines(&points, |_| 5000.0);
+        let context = context(&[a, a], 100.0, fine_s);
+        let collected = run(
+            &context,
+            &tangent(buffer),
+            &blocks,
+            random.pick(&[8e-3, 1e-3, 25e-3]),
+        );
+        let lengths_mm: Vec<f64> = blocks.iter().map(|block| block.length_mm).collect();
+        let roomy = run(&context, &tangent(1000), &blocks, 8e-3);
+        let caps: Vec<f64> = (0..blocks.len())
+            .map(|junction| {
+                let turn = |i: usize| {
+                    let step = points[i + 1] - points[i];
+                    step[1].atan2(step[0])
+                };
+                if junction == 0 {
+                    return 0.0;
+                }
+                let drop = 2.0 * ((turn(junction) - turn(junction - 1)) / 2.0).sin().powi(2);
+                (a * fine_s / drop).clamp(100.0 / 60.0, 5000.0 / 60.0)
+            })
+            .collect();
+        let expected = of_published_insertion(&caps, &lengths_mm, a, buffer);
+        let ends: Vec<f64> = collected
+            .reports
+            .iter()
+            .map(|r| r.end_feed_mm_per_s)
+            .collect();
+        for (block, (found, expected)) in ends.iter().zip(&expected[1..]).enumerate() {
+            // Behind the last block nothing is waited for: it is known while the buffer before it is still full.
+            let knows_more = block + buffer + 1 >= blocks.len() && *found > *expected;
+            assert!(
+                knows_more || (found - expected).abs() < 1e-6,
+                "case {case}, buffer {buffer}, block {block}: {found}, and not {expected} mm/s"
+            );
+        }
+        assert!(collected.duration_s() >= roomy.duration_s() - 1e-9);
+    }
+}

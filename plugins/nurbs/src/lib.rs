@@ -35,7 +35,7 @@ mod windowed;
 
 pub use course::{Course, Stretch};
 pub use limit::chord_feed_mm_per_s;
-pub use options::{Form, Options};
+pub use options::{FormName, Options};
 pub use piece::Piece;
 pub use planner::{BUFFER_BLOCKS, NurbsPlanner};
 

@@ -6,7 +6,7 @@ use tandem_sdk::{PluginError, PluginOptions};
 /// What decides the feed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Form {
+pub enum FormName {
     /// As published: the chord error at the place where a fine period begins. Breaks acceleration and jerk limits.
     Adaptive,
     /// As published: corners, look-ahead with ripple propagation and cubic feed windows, within the limits of every axis.
@@ -22,7 +22,7 @@ tandem_sdk::options! {
     pub struct Options {
         /// What decides the feed: near time-optimal within all limits; the published look-ahead with cubic feed windows,
         /// within them too; or as published, which breaks them (simulated drives with `guard.mode = "count"` only).
-        pub form: Form = Form::default(),
+        pub form: FormName = FormName::default(),
         /// Most that the chord of a fine period may stand off the curve, µm: 0.001 to 1000.
         pub chord_error_um: f64 = 1.0,
     }
@@ -62,14 +62,14 @@ mod tests {
         assert_eq!(
             plain,
             Options {
-                form: Form::Adaptive,
+                form: FormName::Adaptive,
                 chord_error_um: 1.0
             }
         );
-        assert_eq!(Options::parse("").unwrap().form, Form::Scan);
+        assert_eq!(Options::parse("").unwrap().form, FormName::Scan);
         assert_eq!(
             Options::parse("form = \"windowed\"").unwrap().form,
-            Form::Windowed
+            FormName::Windowed
         );
         for (text, word) in [
             ("form = \"fast\"", "fast"),

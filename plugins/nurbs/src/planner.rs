@@ -8,7 +8,7 @@ use tandem_sdk::{
 
 use crate::baseline::Baseline;
 use crate::course::{Course, curve_of};
-use crate::options::{Form, Options};
+use crate::options::{FormName, Options};
 use crate::scan::Scan;
 use crate::stream::Streamer;
 use crate::windowed::Windowed;
@@ -20,11 +20,11 @@ pub const BUFFER_BLOCKS: usize = 64;
 #[derive(Debug)]
 pub struct NurbsPlanner {
     context: PlannerContext,
-    form: Driver,
+    form: Form,
 }
 
 #[derive(Debug)]
-enum Driver {
+enum Form {
     Adaptive(Box<Baseline>),
     Windowed(Box<Streamer<Windowed>>),
     Scan(Box<Streamer<Scan>>),
@@ -47,16 +47,17 @@ impl NurbsPlanner {
                 "nurbs needs finite speed and acceleration limits of all axes",
             ));
         }
-        if options.form != Form::Adaptive && !axes.iter().all(|axis| sound(axis.jerk_mm_per_s3)) {
+        if options.form != FormName::Adaptive && !axes.iter().all(|axis| sound(axis.jerk_mm_per_s3))
+        {
             return Err(PluginError::fixed(
                 "nurbs needs a jerk limit (max_jerk) of all axes, except with form = \"adaptive\"",
             ));
         }
         let chord_error_mm = options.chord_error_um / 1000.0;
         let form = match options.form {
-            Form::Adaptive => Driver::Adaptive(Box::new(Baseline::new(context, chord_error_mm))),
-            Form::Windowed => Driver::Windowed(Box::new(Streamer::new(context, chord_error_mm))),
-            Form::Scan => Driver::Scan(Box::new(Streamer::new(context, chord_error_mm))),
+            FormName::Adaptive => Form::Adaptive(Box::new(Baseline::new(context, chord_error_mm))),
+            FormName::Windowed => Form::Windowed(Box::new(Streamer::new(context, chord_error_mm))),
+            FormName::Scan => Form::Scan(Box::new(Streamer::new(context, chord_error_mm))),
         };
         Ok(Self {
             context: *context,
@@ -70,9 +71,9 @@ impl NurbsPlanner {
         sink: &mut dyn SegmentSink,
     ) -> Result<Option<f64>, PluginError> {
         match &mut self.form {
-            Driver::Adaptive(form) => Ok(form.emit(left_s, sink)),
-            Driver::Windowed(form) => form.emit(left_s, sink),
-            Driver::Scan(form) => form.emit(left_s, sink),
+            Form::Adaptive(form) => Ok(form.emit(left_s, sink)),
+            Form::Windowed(form) => form.emit(left_s, sink),
+            Form::Scan(form) => form.emit(left_s, sink),
         }
     }
 }
@@ -92,11 +93,11 @@ fn check_curve(axes: &Axes, curve: Option<Curve<'_>>) -> Result<(), PluginError>
 impl Planner for NurbsPlanner {
     fn describe(&self) -> PlannerDescription {
         match self.form {
-            Driver::Adaptive(_) => PlannerDescription {
+            Form::Adaptive(_) => PlannerDescription {
                 breaks_limits: 1,
                 ..PlannerDescription::order_2()
             },
-            Driver::Windowed(_) | Driver::Scan(_) => PlannerDescription {
+            Form::Windowed(_) | Form::Scan(_) => PlannerDescription {
                 order: 3,
                 ..PlannerDescription::order_2()
             },
@@ -114,9 +115,9 @@ impl Planner for NurbsPlanner {
 
     fn accept(&mut self, block: &Block, curve: Option<Curve<'_>>) -> Result<Accepted, PluginError> {
         let waiting = match &self.form {
-            Driver::Adaptive(form) => form.blocks(),
-            Driver::Windowed(form) => form.blocks(),
-            Driver::Scan(form) => form.blocks(),
+            Form::Adaptive(form) => form.blocks(),
+            Form::Windowed(form) => form.blocks(),
+            Form::Scan(form) => form.blocks(),
         };
         if waiting >= BUFFER_BLOCKS {
             return Ok(Accepted::Full);
@@ -125,18 +126,18 @@ impl Planner for NurbsPlanner {
         let course = Course::new(&self.context, block, curve)
             .map_err(|error| PluginError::new(error.to_string()))?;
         match &mut self.form {
-            Driver::Adaptive(form) => form.accept(block, course),
-            Driver::Windowed(form) => form.accept(block, course),
-            Driver::Scan(form) => form.accept(block, course),
+            Form::Adaptive(form) => form.accept(block, course),
+            Form::Windowed(form) => form.accept(block, course),
+            Form::Scan(form) => form.accept(block, course),
         }
         Ok(Accepted::Accepted)
     }
 
     fn finish(&mut self) {
         match &mut self.form {
-            Driver::Adaptive(form) => form.finish(),
-            Driver::Windowed(form) => form.finish(),
-            Driver::Scan(form) => form.finish(),
+            Form::Adaptive(form) => form.finish(),
+            Form::Windowed(form) => form.finish(),
+            Form::Scan(form) => form.finish(),
         }
     }
 
@@ -153,9 +154,9 @@ impl Planner for NurbsPlanner {
             }
         }
         let done = match &self.form {
-            Driver::Adaptive(form) => form.is_done(),
-            Driver::Windowed(form) => form.is_done(),
-            Driver::Scan(form) => form.is_done(),
+            Form::Adaptive(form) => form.is_done(),
+            Form::Windowed(form) => form.is_done(),
+            Form::Scan(form) => form.is_done(),
         };
         Ok(Advanced {
             duration_s: emitted_s,
@@ -165,9 +166,9 @@ impl Planner for NurbsPlanner {
 
     fn reset(&mut self, position: &AxisVector) {
         match &mut self.form {
-            Driver::Adaptive(form) => form.reset(position),
-            Driver::Windowed(form) => form.reset(position),
-            Driver::Scan(form) => form.reset(position),
+            Form::Adaptive(form) => form.reset(position),
+            Form::Windowed(form) => form.reset(position),
+            Form::Scan(form) => form.reset(position),
         }
     }
 }

@@ -3,8 +3,9 @@
 mod common;
 
 use common::measure::{chord_error_mm, distance, realised_mm};
-use common::{canonical, case, context, curve_block, run};
+use common::{canonical, context, curve_block, run};
 use tandem_motion::nurbs::{ArcLength, Nurbs, Place};
+use tandem_rig::case;
 use tandem_sdk::{Axes, SegmentFlags};
 
 const PERIOD_S: f64 = 0.002;

@@ -3,7 +3,8 @@
 mod common;
 
 use common::measure::{BEST_S, Figures, figures};
-use common::{canonical, case, context, curve_block, run};
+use common::{canonical, context, curve_block, run};
+use tandem_rig::case;
 use tandem_sdk::{AxisVector, Block, BlockKind, SegmentFlags};
 
 fn drive(form: &str, name: &str) -> Figures {

@@ -3,8 +3,9 @@
 mod common;
 
 use common::measure::{BEST_S, Figures, figures};
-use common::{canonical, case, context, curve_block, run};
+use common::{canonical, context, curve_block, run};
 use serde_json::Value;
+use tandem_rig::case;
 
 fn drive(form: &str, name: &str) -> Figures {
     let (data, length_mm) = canonical(name);

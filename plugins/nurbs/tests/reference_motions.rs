@@ -3,9 +3,10 @@
 mod common;
 
 use common::measure::{BEST_S, chord_error_mm, differences, realised_mm, xy};
-use common::{canonical, case, context, curve_block, numbers, run};
+use common::{canonical, context, curve_block, run};
 use serde_json::Value;
 use tandem_motion::nurbs::{ArcLength, Nurbs, Place};
+use tandem_rig::{case, numbers};
 
 const PERIOD_S: f64 = 0.002;
 

@@ -67,7 +67,7 @@ fn trial(path: &str, options: &Options, repeats: usize, tolerance_mm: f64) {
         effort.stops,
         rounds / effort.windows as f64,
         effort.smooth_iterations as f64 / rounds,
-        effort.pace_iterations as f64 / rounds,
+        effort.retime_iterations as f64 / rounds,
         collected.segments.len(),
     );
 }

@@ -55,7 +55,7 @@ pub struct PathAhead<const L: usize> {
 /// What the planner for any number of axes asks of one.
 pub trait AnyCore: Send + std::fmt::Debug {
     /// Whether there is room for another block: fewer chords than that are held, and fewer blocks.
-    fn has_room(&self, most_chords: usize) -> bool;
+    fn has_room(&self, max_chords: usize) -> bool;
     /// Whether the path of a block can be laid.
     fn check_path(&self, block: &Block, curve: Option<Curve<'_>>) -> Result<(), PluginError>;
     /// Takes a block that was checked.
@@ -100,7 +100,7 @@ impl<const L: usize> PathAhead<L> {
     /// A block too short to be a motion: it begins and ends.
     fn skip(&mut self, blocks: &mut Blocks, sink: &mut dyn SegmentSink) {
         if let Some(Item::Leg(leg)) = self.route.pop() {
-            self.held_s -= leg.least_s;
+            self.held_s -= leg.min_s;
             if !blocks.is_reported(&leg.block) {
                 let index = leg.block.index;
                 blocks.report(
@@ -312,14 +312,14 @@ impl<const L: usize> Windows for PathAhead<L> {
 }
 
 impl<const L: usize> AnyCore for Core<L> {
-    fn has_room(&self, most_chords: usize) -> bool {
+    fn has_room(&self, max_chords: usize) -> bool {
         let Self { stream, ahead } = self;
         let driven_s = stream
             .driven_s()
             .map_or(0.0, |driven_s| ahead.front_driven_s(driven_s));
         let enough_s = HELD.0 * ahead.planning.tuning.window_s + HELD.1;
         let held = ahead.route.chord_count().max(ahead.route.items.len());
-        ahead.route.items.is_empty() || held < most_chords && ahead.held_s - driven_s < enough_s
+        ahead.route.items.is_empty() || held < max_chords && ahead.held_s - driven_s < enough_s
     }
 
     fn check_path(&self, block: &Block, curve: Option<Curve<'_>>) -> Result<(), PluginError> {

@@ -37,7 +37,7 @@ impl<const L: usize> PathAhead<L> {
             return 0.0;
         };
         let share = (self.window.along(driven_s) - leg.start) / (leg.end - leg.start).max(1e-12);
-        leg.least_s * share.clamp(0.0, 1.0)
+        leg.min_s * share.clamp(0.0, 1.0)
     }
 
     /// Emits a segment: to the end of the piece, of the block, or of `left_s`.
@@ -113,7 +113,7 @@ impl<const L: usize> PathAhead<L> {
 
     fn pop_leg(&mut self) {
         if let Some(Item::Leg(leg)) = self.route.pop() {
-            self.held_s -= leg.least_s;
+            self.held_s -= leg.min_s;
         }
     }
 

@@ -1,7 +1,7 @@
-//! Planning one window: smoothing and pacing take turns.
+//! Planning one window: smoothing and retiming take turns.
 
-use tandem_motion::retime::End;
-use tandem_motion::tube::{Asked, Lanes, Pacer, Place, Smoother, Spline, each};
+use tandem_motion::retime::{Asked, End, Factors, Point, Retimer};
+use tandem_motion::tube::{Lanes, Smoother, Spline, each};
 
 use crate::feeds::Feeds;
 use crate::frame::Frame;
@@ -27,6 +27,10 @@ const FIRM_INTERVALS: usize = 12;
 pub const INTERVALS: (usize, usize) = (7, 420);
 /// Largest rate squared.
 const MAX_RATE_SQUARED: f64 = 16.0;
+/// Least rate squared: a round makes a motion ten times slower at most.
+const MIN_RATE_SQUARED: f64 = 0.01;
+/// Groups of rows of an interval: jerk at three places, acceleration at its start.
+const RETIMED: usize = 4;
 /// Mean complementarity asked of the last round, and of those before.
 const GAP: f64 = 1e-5;
 const LOOSE: f64 = 3e-3;
@@ -120,8 +124,8 @@ pub struct Effort {
     /// Iterations of smoothing.
     pub smooth_iterations: u64,
     /// Iterations of pacing.
-    pub pace_iterations: u64,
-    /// Turns of smoothing and pacing.
+    pub retime_iterations: u64,
+    /// Turns of smoothing and retiming.
     pub rounds: u64,
 }
 
@@ -134,7 +138,7 @@ pub struct Planning<const L: usize> {
     waypoints: Waypoints<L>,
     spline: Spline<L>,
     smoother: Smoother<L>,
-    pacer: Pacer<L>,
+    retimer: Retimer<L, RETIMED>,
     marks: Vec<Mark>,
     times: Vec<f64>,
     checker: Checker<L>,
@@ -167,7 +171,7 @@ impl<const L: usize> Planning<L> {
             waypoints: Waypoints::default(),
             spline: Spline::default(),
             smoother: Smoother::default(),
-            pacer: Pacer::default(),
+            retimer: Retimer::default(),
             marks: Vec::new(),
             times: Vec::new(),
             checker: Checker::default(),
@@ -203,6 +207,7 @@ impl<const L: usize> Planning<L> {
         let end = self.marks[self.marks.len() - 1].s;
         self.waypoints.gather(run, start.s, end);
         let travel = frame.travel.around(run, (start.s, end), &start.state[0]);
+        let rests = resting(run, start, end);
         let mut shares = Shares {
             jerk: JERK_SHARE,
             acceleration: ACCELERATION_SHARE,
@@ -225,7 +230,7 @@ impl<const L: usize> Planning<L> {
         loop {
             let last = settled || round >= rounds;
             self.effort.rounds += 1;
-            if !self.round(run, frame, start, (&shares, travel), &counted, last) {
+            if !self.round(run, frame, start, (&shares, travel, rests), &counted, last) {
                 return false;
             }
             let now_s = self.marks[self.marks.len() - 1].t;
@@ -300,7 +305,7 @@ impl<const L: usize> Planning<L> {
         run: &Run<'_, L>,
         frame: &Frame<L>,
         start: &Start<'_, L>,
-        (shares, travel): (&Shares, Option<Travel<L>>),
+        (shares, travel, rests): (&Shares, Option<Travel<L>>, [bool; L]),
         counted: &Lanes<L>,
         last: bool,
     ) -> bool {
@@ -322,6 +327,7 @@ impl<const L: usize> Planning<L> {
             },
             travel,
             margin: shares.margin,
+            rests,
             ends,
         };
         self.waypoints.choose(run, &self.marks, grid, &keep);
@@ -333,18 +339,20 @@ impl<const L: usize> Planning<L> {
         let smoothed = self
             .smoother
             .smooth(&mut self.spline, &self.waypoints.chosen, &frame.jerk);
-        self.fill_pacer(run, frame, shares, counted);
+        self.fill_retimer(run, frame, shares, counted);
         let asked = if last {
             Asked {
                 gap: GAP,
                 violation: INFEASIBLE,
                 iterations: 25,
+                min_rate_squared: MIN_RATE_SQUARED,
             }
         } else {
             Asked {
                 gap: LOOSE,
                 violation: 0.05,
                 iterations: 25,
+                min_rate_squared: MIN_RATE_SQUARED,
             }
         };
         let begin = if start.resting {
@@ -352,11 +360,11 @@ impl<const L: usize> Planning<L> {
         } else {
             End::Moving
         };
-        let paced = self.pacer.solve((begin, End::Rest), &asked);
-        self.infeasible = paced.violation > INFEASIBLE;
+        let retimed = self.retimer.solve((begin, End::Rest), &asked);
+        self.infeasible = retimed.violation > INFEASIBLE;
         self.effort.intervals += intervals as u64;
         self.effort.smooth_iterations += smoothed.iterations as u64;
-        self.effort.pace_iterations += paced.iterations as u64;
+        self.effort.retime_iterations += retimed.iterations as u64;
         self.lay_marks(start.s)
     }
 
@@ -385,7 +393,7 @@ impl<const L: usize> Planning<L> {
         self.spline.end(&run.chords[last].at(end));
     }
 
-    fn fill_pacer(
+    fn fill_retimer(
         &mut self,
         run: &Run<'_, L>,
         frame: &Frame<L>,
@@ -394,16 +402,17 @@ impl<const L: usize> Planning<L> {
     ) {
         let speed = &frame.speed[usize::from(run.rapid)];
         let per_speed: Lanes<L> = speed.map(|v| 1.0 / (0.9995 * v));
-        let per_jerk: Lanes<L> = frame.jerk.map(|j| 1.0 / (shares.jerk * j));
-        let per_acceleration: Lanes<L> =
-            frame.acceleration.map(|a| 1.0 / (shares.acceleration * a));
+        let factors = Factors {
+            per_jerk: frame.jerk.map(|j| 1.0 / (shares.jerk * j)),
+            per_acceleration: frame.acceleration.map(|a| 1.0 / (shares.acceleration * a)),
+        };
         let mut feeds = Feeds {
             run,
             along: &self.waypoints.along,
             waypoints: &self.waypoints.chosen,
             at: 0,
         };
-        let place = |[_, first, second, _]: &[Lanes<L>; 4], feed: f64| {
+        let point = |[_, first, second, third]: &[Lanes<L>; 4], feed: f64| {
             let mut squared = 0.0;
             let mut axis = 0.0f64;
             for l in 0..L {
@@ -415,34 +424,33 @@ impl<const L: usize> Planning<L> {
             let most = most
                 .min(1.0 / (axis * axis).max(1e-12))
                 .min(MAX_RATE_SQUARED);
-            Place {
+            Point {
                 first: *first,
                 second: *second,
+                third: *third,
                 most,
+                ..Point::default()
             }
         };
-        self.pacer.begin();
+        self.retimer.begin(self.spline.step_s);
         let mut ends = self.spline.at(0, 0.0);
         for k in 0..self.spline.intervals() {
             let feed = feeds.of(k);
-            let start = place(&ends, feed);
             let middle = self.spline.at(k, 0.5);
-            let third = middle[3];
-            let middle = place(&middle, feed);
+            let start = [ends[0], ends[1], ends[2], middle[3]];
             ends = self.spline.at(k, 1.0);
-            let limits = (&per_acceleration, &per_jerk);
-            self.pacer.push(
-                (&start, &middle, [&ends[1], &ends[2]]),
-                &third,
-                limits,
-                self.spline.step_s,
-            );
+            let points = [
+                point(&start, feed),
+                point(&middle, feed),
+                point(&ends, feed),
+            ];
+            self.retimer.push(&points, &factors);
         }
     }
 
     /// The times of the knots, and the marks: when the motion passes the waypoints.
     fn lay_marks(&mut self, from: f64) -> bool {
-        let rate = &self.pacer.rate;
+        let rate = &self.retimer.rate;
         let h = self.spline.step_s;
         self.times.clear();
         self.times.push(0.0);
@@ -470,7 +478,7 @@ impl<const L: usize> Planning<L> {
         window.marks.clone_from(&self.marks);
         let state = |k: usize, z: f64| -> State<L> {
             let [x, x1, x2, _] = self.spline.at(k, z);
-            let [b, slope, _] = self.pacer.rate.at(k, z, h);
+            let [b, slope, _] = self.retimer.rate.at(k, z, h);
             let rate = b.max(1e-9).sqrt();
             [
                 x,
@@ -489,6 +497,21 @@ impl<const L: usize> Planning<L> {
             from = to;
         }
     }
+}
+
+/// The lanes that rest at the start, and in which the path does not go anywhere up to `end`.
+fn resting<const L: usize>(run: &Run<'_, L>, start: &Start<'_, L>, end: f64) -> [bool; L] {
+    let [at, velocity, acceleration] = &start.state;
+    let first = run.chord_at(start.s, 0);
+    std::array::from_fn(|l| {
+        velocity[l] == 0.0
+            && acceleration[l] == 0.0
+            && at[l] == run.chords[first].start[l]
+            && run.chords[first..]
+                .iter()
+                .take_while(|chord| chord.s < end)
+                .all(|chord| chord.direction[l] == 0.0)
+    })
 }
 
 /// Share of the tolerance that may lie between two samples before a refused window is to turn more slowly.

@@ -65,7 +65,7 @@ pub struct Leg {
     /// The machine rests at its end.
     pub rests: bool,
     /// The time it takes at its feed, s.
-    pub least_s: f64,
+    pub min_s: f64,
     /// Its chords, counted from the first ever.
     pub first_chord: u64,
     pub chords: u32,
@@ -265,7 +265,7 @@ impl<const L: usize> Route<L> {
         let chords = (self.first + self.chords.len() as u64 - first_chord) as u32;
         let rests = block.ends_at_rest();
         let fastest = before.map_or(f64::INFINITY, |direction| along(limits, &direction));
-        let least_s = (block.length_mm / (block.command_feed_mm_per_s() * feed_ratio))
+        let min_s = (block.length_mm / (block.command_feed_mm_per_s() * feed_ratio))
             .max((self.end - start) / fastest);
         self.items.push_back(Item::Leg(Leg {
             block: *block,
@@ -273,11 +273,11 @@ impl<const L: usize> Route<L> {
             end: self.end,
             rotary,
             rests,
-            least_s,
+            min_s,
             first_chord,
             chords,
         }));
-        least_s
+        min_s
     }
 
     /// The machine rests at `s`: what lies before it belongs to no run any more.

@@ -268,7 +268,7 @@ impl<const L: usize> Checker<L> {
             at: 0,
         };
         let mut worst = 0.0f64;
-        let mut most_bulge = 0.0f64;
+        let mut max_bulge = 0.0f64;
         let mut piece = 0;
         let mut i = run.chord_at(from, 0).max(1);
         while i < run.chords.len() && run.chords[i].s < to {
@@ -292,7 +292,7 @@ impl<const L: usize> Checker<L> {
                 let mut bulge = self.bends[piece] * period_s * period_s / 8.0;
                 if off + bulge > ALLOWED * tolerance {
                     bulge = self.bulge_around(window, piece, t, period_s);
-                    most_bulge = larger(most_bulge, bulge / tolerance);
+                    max_bulge = larger(max_bulge, bulge / tolerance);
                 }
                 worst = larger(worst, (off + bulge) / (ALLOWED * tolerance));
                 if worst > FAR || worst.is_nan() {
@@ -301,7 +301,7 @@ impl<const L: usize> Checker<L> {
             }
             i += 1;
         }
-        (worst, most_bulge)
+        (worst, max_bulge)
     }
 
     /// How far the motion stands off the chain of samples around `t`: what turns it counts alone, as far as its direction is

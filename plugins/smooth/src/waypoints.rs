@@ -37,6 +37,9 @@ const BEGINNING: f64 = 8.0;
 const DENSEST: f64 = 16.0;
 /// Most waypoints of a window: two lie a sixteenth of a step apart, or between them lie those that fill a gap.
 pub const MAX_WAYPOINTS: usize = (DENSEST as usize + 2) * INTERVALS.1;
+/// Share of its box that a lane gets which rests: a slow motion has next to no jerk, and would go to the middle of what its travel
+/// leaves of a wide one.
+const STILL: f64 = 1e-6;
 /// Vertices looked at on each side.
 const LOOKS: usize = 24;
 
@@ -91,6 +94,8 @@ pub struct Keep<const L: usize> {
     /// The ends of the travel, where they are near, and how far inside of them the motion is to stay, in lane units.
     pub travel: Option<Travel<L>>,
     pub margin: f64,
+    /// Lanes that rest in the whole window: they stay on the path, whatever the tolerance leaves.
+    pub rests: [bool; L],
     /// Path coordinates of the window's start and end.
     pub ends: (f64, f64),
 }
@@ -211,8 +216,8 @@ impl<const L: usize> Waypoints<L> {
     ) {
         let place = t / grid.step_s;
         let interval = (place as usize).min(grid.intervals - 1);
-        let point = run.chords[candidate.chord as usize].at(candidate.s);
-        let mut point = point;
+        let on_path = run.chords[candidate.chord as usize].at(candidate.s);
+        let mut point = on_path;
         let begun = (place / BEGINNING).min(1.0);
         let share = keep.begin + begun * (keep.share - keep.begin);
         let mut half = each(|l| share * half[l]);
@@ -221,6 +226,9 @@ impl<const L: usize> Waypoints<L> {
                 .min(keep.ends.1 - candidate.s)
                 .max(0.0);
             travel.cut(&mut point, &mut half, keep.margin, way);
+        }
+        for l in (0..grid.lanes).filter(|l| keep.rests[*l]) {
+            (point[l], half[l]) = (on_path[l], STILL * half[l].max(f64::MIN_POSITIVE));
         }
         self.chosen.push(Waypoint {
             interval: interval as u32,

@@ -12,7 +12,7 @@ use tandem_sdk::{
 use tandem_smooth::{Effort, Options, SmoothPlanner};
 
 /// Machines in all.
-const MACHINES: u64 = 40;
+const MACHINES: u64 = 16;
 /// Phases at which each motion is sampled.
 const PHASES: usize = 3;
 /// Bytes that a planner holds at most.

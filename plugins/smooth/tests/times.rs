@@ -56,7 +56,7 @@ fn median_s(name: &str) -> f64 {
 
 #[test]
 fn times_are_near_the_best_known_whatever_the_settings() {
-    for (name, most_s) in [
+    for (name, max_s) in [
         ("square", 1.41),
         ("serpentine", 2.82),
         ("raster", 28.95),
@@ -65,7 +65,7 @@ fn times_are_near_the_best_known_whatever_the_settings() {
         ("zigzag", 1.40),
         ("arcline", 1.065),
     ] {
-        assert!(median_s(name) <= most_s, "{name}");
+        assert!(median_s(name) <= max_s, "{name}");
     }
 }
 

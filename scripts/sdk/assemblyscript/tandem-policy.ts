@@ -1,6 +1,6 @@
-// Tandem policy scripts in AssemblyScript: ABI version 1.
+// Tandem policy scripts in AssemblyScript: ABI version 2.
 //
-// A script imports what it needs from here, exports `tandem_policy_v1` again, and exports `on_blocks`, `on_period` or
+// A script imports what it needs from here, exports `tandem_policy_v2` again, and exports `on_blocks`, `on_period` or
 // both. `each` turns a window into calls of a function of one block. docs/policies.md explains every number.
 
 /** Kinds of a block. */
@@ -13,6 +13,51 @@ export const DWELL: u32 = 4;
 /** Flags of a block: the machine is at rest at its start, at its end. */
 export const STARTS_AT_REST: u32 = 1;
 export const ENDS_AT_REST: u32 = 2;
+
+/** Bytes of a structure of the ABI. */
+const BLOCK: usize = 640;
+const BLOCK_WITHOUT_GEOMETRY: usize = 192;
+const PERIOD_BYTES: usize = 568;
+const INPUT: usize = 32;
+
+/** What the script looks at by name: a value of the program, a signal of the machine, or an axis. */
+@unmanaged
+export class Input {
+  private size: u32;
+  private kind: u32;
+  private name: u32;
+  private name_bytes: u32;
+  private words: u32;
+  private words_bytes: u32;
+  private optional: u32;
+  /** Where its value stands, from the first call on; beyond 64 where this machine has none. */
+  place: u32;
+
+  /** Whether this machine has it. */
+  @inline get there(): bool {
+    return this.place < 64;
+  }
+
+  /** Use `program`, `signal`, `optionalSignal` or `axis`. */
+  static fill(at: usize, kind: u32, name: string, words: string, optional: u32): Input {
+    const made = changetype<Input>(at);
+    made.size = <u32>INPUT;
+    made.kind = kind;
+    made.name = <u32>changetype<usize>(name);
+    made.name_bytes = <u32>(name.length << 1);
+    made.words = <u32>changetype<usize>(words);
+    made.words_bytes = <u32>(words.length << 1);
+    made.optional = optional;
+    made.place = <u32>-1;
+    return made;
+  }
+}
+
+/** Entry `place` of `count` numbers; NaN where it is none of them. */
+@inline
+function entry(at: usize, place: u32, count: u32): f64 {
+  return place < count ? load<f64>(at + (<usize>place << 3)) : NaN;
+}
 
 /** One block. What begins with `ask_` is the answer; what is not written stays as it is. */
 @unmanaged
@@ -55,6 +100,43 @@ export class Block {
   /** Whether the block is cut at a feed: a line, an arc or a curve. */
   @inline get cuts(): bool {
     return this.kind != RAPID && this.kind != DWELL;
+  }
+  /** Diameter of the tool; NaN where the tool table has none. */
+  @inline get tool_diameter_mm(): f64 {
+    return load<f64>(changetype<usize>(this), 120);
+  }
+  /** What the program has stated of `input`; NaN where nothing is in force. */
+  @inline program(input: Input): f64 {
+    return entry(changetype<usize>(this) + 128, input.place, 8);
+  }
+  /** Where the block starts along `axis`, machine coordinates, mm or rad. NaN where the machine has no such axis, in all that
+   * follow too. */
+  @inline start(axis: Input): f64 {
+    return entry(changetype<usize>(this) + 192, axis.place, 8);
+  }
+  /** Where it ends. */
+  @inline end(axis: Input): f64 {
+    return entry(changetype<usize>(this) + 256, axis.place, 8);
+  }
+  /** Program coordinate = machine coordinate - offset. */
+  @inline offset(axis: Input): f64 {
+    return entry(changetype<usize>(this) + 320, axis.place, 8);
+  }
+  /** How far the axis moves for each mm of the path at the start: the direction. */
+  @inline start_direction(axis: Input): f64 {
+    return entry(changetype<usize>(this) + 384, axis.place, 8);
+  }
+  /** The same at the end. */
+  @inline end_direction(axis: Input): f64 {
+    return entry(changetype<usize>(this) + 448, axis.place, 8);
+  }
+  /** The lowest that it is anywhere in the block, with its sign. */
+  @inline lowest_share(axis: Input): f64 {
+    return entry(changetype<usize>(this) + 512, axis.place, 8);
+  }
+  /** The highest. */
+  @inline highest_share(axis: Input): f64 {
+    return entry(changetype<usize>(this) + 576, axis.place, 8);
   }
 }
 
@@ -99,6 +181,31 @@ export class Period {
   current_5_a: f64;
   current_6_a: f64;
   current_7_a: f64;
+
+  /** Position commanded at the end of the period along `axis`, mm or rad. */
+  @inline position(axis: Input): f64 {
+    return entry(changetype<usize>(this) + 176, axis.place, 8);
+  }
+  /** Speed measured, mean. */
+  @inline speed(axis: Input): f64 {
+    return entry(changetype<usize>(this) + 240, axis.place, 8);
+  }
+  /** Position commanded less measured, mean. */
+  @inline axis_error(axis: Input): f64 {
+    return entry(changetype<usize>(this) + 304, axis.place, 8);
+  }
+  /** Its largest magnitude. */
+  @inline max_axis_error(axis: Input): f64 {
+    return entry(changetype<usize>(this) + 368, axis.place, 8);
+  }
+  /** A signal, mean; of a digital input the share of the period in which it was 1. NaN where nothing was heard of it. */
+  @inline signal(input: Input): f64 {
+    return entry(changetype<usize>(this) + 432, input.place, 16);
+  }
+  /** Rate of program time, mean, 0 to 1. */
+  @inline get sigma(): f64 {
+    return load<f64>(changetype<usize>(this), 560);
+  }
 }
 
 /** A parameter of the machine file. Its value is there from the first call on. */
@@ -133,11 +240,15 @@ export class Parameter {
 }
 
 const MOST_PARAMETERS: i32 = 32;
-const LAYOUT: usize = memory.data(48, 8);
-const WINDOW: usize = memory.data(64 * 120, 8);
-const PERIOD: usize = memory.data(176, 8);
+const MOST_INPUTS: i32 = 32;
+const LAYOUT: usize = memory.data(64, 8);
+const WINDOW: usize = memory.data(64 * 640, 8);
+const PERIOD: usize = memory.data(568, 8);
 const PARAMETERS: usize = memory.data(32 * 56, 8);
+const INPUTS: usize = memory.data(32 * 32, 8);
 let declared: i32 = 0;
+let looked_at: i32 = 0;
+let block_bytes: usize = BLOCK;
 let state: usize = 0;
 let state_bytes: u32 = 0;
 
@@ -149,6 +260,44 @@ export function parameter(name: string, fallback: f64, lowest: f64, highest: f64
   return Parameter.fill(at, name, fallback, lowest, highest, text);
 }
 
+function input(kind: u32, name: string, words: string, optional: u32): Input {
+  if (looked_at == MOST_INPUTS) unreachable();
+  const at = INPUTS + <usize>looked_at * INPUT;
+  looked_at += 1;
+  return Input.fill(at, kind, name, words, optional);
+}
+
+/** Looks at what the part program states: a named parameter `#<name>`, or `name = value` in a comment. `words`, separated by
+ * commas, stand for 0, 1, 2 and so on. Once, outside of any function; so are those that follow. */
+export function program(name: string, words: string = ""): Input {
+  return input(0, name, words, 0);
+}
+
+/** Looks at a signal of the feed strategy, an analog or a digital input, by its name; a machine without it is refused. */
+export function signal(name: string): Input {
+  return input(1, name, "", 0);
+}
+
+/** The same where the script can do without. */
+export function optionalSignal(name: string): Input {
+  return input(1, name, "", 1);
+}
+
+/** Looks at an axis, by its letter; a machine without it is refused. */
+export function axis(name: string): Input {
+  return input(2, name, "", 0);
+}
+
+/** The same where the script can do without. */
+export function optionalAxis(name: string): Input {
+  return input(2, name, "", 1);
+}
+
+/** The script does not look at where blocks lie and which way they go: its calls cost less. */
+export function withoutGeometry(): void {
+  block_bytes = BLOCK_WITHOUT_GEOMETRY;
+}
+
 /** Names the buffer that `save` fills and `restore` reads. */
 export function keepState(at: usize, bytes: u32): void {
   state = at;
@@ -158,16 +307,16 @@ export function keepState(at: usize, bytes: u32): void {
 /** Calls `tune` with each block of a window. */
 @inline
 export function each(window: usize, count: i32, tune: (block: Block) => void): void {
-  for (let i = 0; i < count; i++) tune(changetype<Block>(window + <usize>i * 120));
+  for (let i = 0; i < count; i++) tune(changetype<Block>(window + <usize>i * block_bytes));
 }
 
 /** What the host asks for first; a script exports it again. */
-export function tandem_policy_v1(): usize {
-  store<u32>(LAYOUT, 48, 0);
-  store<u32>(LAYOUT, 120, 4);
+export function tandem_policy_v2(): usize {
+  store<u32>(LAYOUT, 64, 0);
+  store<u32>(LAYOUT, <u32>block_bytes, 4);
   store<u32>(LAYOUT, <u32>WINDOW, 8);
   store<u32>(LAYOUT, 64, 12);
-  store<u32>(LAYOUT, 176, 16);
+  store<u32>(LAYOUT, <u32>PERIOD_BYTES, 16);
   store<u32>(LAYOUT, <u32>PERIOD, 20);
   store<u32>(LAYOUT, 56, 24);
   store<u32>(LAYOUT, <u32>PARAMETERS, 28);
@@ -175,5 +324,8 @@ export function tandem_policy_v1(): usize {
   store<u32>(LAYOUT, 1, 36);
   store<u32>(LAYOUT, <u32>state, 40);
   store<u32>(LAYOUT, state_bytes, 44);
+  store<u32>(LAYOUT, <u32>INPUTS, 48);
+  store<u32>(LAYOUT, <u32>INPUT, 52);
+  store<u32>(LAYOUT, looked_at, 56);
   return LAYOUT;
 }

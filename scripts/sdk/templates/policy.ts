@@ -1,6 +1,6 @@
 // Blocks with a sharp turn at either end are driven at most at a feed of the machine's own.
 import { Block, each, parameter } from "./tandem-policy";
-export { tandem_policy_v1 } from "./tandem-policy";
+export { tandem_policy_v2 } from "./tandem-policy";
 
 // [policy.parameters] of the machine file: name, default, lowest, highest, what it means.
 const turn = parameter("sharp_turn_deg", 30, 1, 180, "Turn from which a corner counts as sharp, in degrees");

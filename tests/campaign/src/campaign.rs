@@ -47,24 +47,41 @@ pub struct Tally {
     /// Samples of all runs.
     pub samples: u64,
     /// Most memory of a run, MB.
-    pub most_memory_mb: f64,
+    pub max_memory_mb: f64,
     /// Seeds of programs that a planner refused, with the reason.
     pub refused: Vec<(u64, String)>,
-    /// Seeds that failed, with planner, kind and reason.
-    pub failed: Vec<(u64, String)>,
+    /// Runs that failed.
+    pub failed: Vec<Failed>,
+}
+
+/// A run that failed.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Failed {
+    /// Its seed.
+    pub seed: u64,
+    /// The planner, with its form where it has several.
+    pub planner: String,
+    /// What failed, as the table of `docs/campaign.md` names it.
+    pub kind: String,
+    /// In words.
+    pub why: String,
 }
 
 impl Tally {
     fn count(&mut self, seed: u64, report: &Report) -> u64 {
         self.runs += 1;
         self.samples += report.samples;
-        self.most_memory_mb = self.most_memory_mb.max(report.memory_mb);
+        self.max_memory_mb = self.max_memory_mb.max(report.memory_mb);
         let Report {
             planner, kind, why, ..
         } = report;
         if report.is_failure() {
-            self.failed
-                .push((seed, format!("{planner}: {kind}: {why}")));
+            self.failed.push(Failed {
+                seed,
+                planner: planner.clone(),
+                kind: kind.clone(),
+                why: why.clone(),
+            });
         } else if kind == "refused" {
             self.refused.push((seed, format!("{planner}: {why}")));
         }
@@ -95,14 +112,14 @@ impl Tally {
         let Self {
             runs,
             samples,
-            most_memory_mb,
+            max_memory_mb,
             failed,
             refused,
             ..
         } = self;
         let (failed, refused) = (failed.len(), refused.len());
         let last = format!(
-            "{runs} runs, {samples} samples, {failed} failed, {refused} refused, {most_memory_mb:.0} MB at most\n"
+            "{runs} runs, {samples} samples, {failed} failed, {refused} refused, {max_memory_mb:.0} MB at most\n"
         );
         text + &last
     }

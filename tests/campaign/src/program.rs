@@ -135,12 +135,12 @@ impl Program<'_> {
     }
 
     fn tolerance(&mut self) {
-        let least_mm = if self.machine.planner == Planner::Smooth {
+        let min_mm = if self.machine.planner == Planner::Smooth {
             2e-4
         } else {
             1e-4
         };
-        let mm = self.random.length(least_mm, 1.0);
+        let mm = self.random.length(min_mm, 1.0);
         let text = if self.random.below(3) == 0 {
             "G64".to_string()
         } else {
@@ -158,11 +158,11 @@ impl Program<'_> {
     }
 
     fn dwell(&mut self) {
-        let most_s = self.left_s.min(0.5);
+        let max_s = self.left_s.min(0.5);
         let dwell_s = if self.random.below(6) == 0 {
             0.0
         } else {
-            self.random.length(1e-4, most_s.max(2e-4))
+            self.random.length(1e-4, max_s.max(2e-4))
         };
         let text = format!("{dwell_s:.4}");
         self.left_s -= dwell_s;

@@ -27,7 +27,7 @@ pub struct Ran {
     /// What the host says of the run; none where it was ended because it took too long.
     pub outcome: Option<Outcome>,
     /// Most samples that it was given.
-    pub most_samples: usize,
+    pub max_samples: usize,
     /// Most memory that the process had until the end of the run, MB.
     pub memory_mb: f64,
 }
@@ -106,12 +106,12 @@ pub fn drive(case: &Case, folder: &Path, registry: &Registry) -> Result<Driven, 
     let bound_s = Bound::of(&program, &machine, &judging, asked.filter_s).map_err(wrong)?;
     let until_s = asked.last_tick as f64 * machine.fine_period_s
         + asked.stalled as f64 * machine.rough_period_s;
-    let most_samples = (((bound_s + until_s) / machine.fine_period_s) as usize).min(MAX_SAMPLES);
+    let max_samples = (((bound_s + until_s) / machine.fine_period_s) as usize).min(MAX_SAMPLES);
     let parsed = tandem_gcode::Program::open(&program).map_err(|e| wrong(e.to_string()))?;
     forget_most_memory();
     let prepared = Run::prepare(machine.clone(), registry, parsed, Switches::default());
     let run = prepared.map_err(|refusal| Box::new(refused(&refusal)))?;
-    let mut kept = Kept::new(&machine, most_samples);
+    let mut kept = Kept::new(&machine, max_samples);
     let driven = catch_unwind(AssertUnwindSafe(|| {
         run.drive(Clock::Virtual, &asked.commands, &mut kept)
     }));
@@ -126,8 +126,8 @@ pub fn drive(case: &Case, folder: &Path, registry: &Registry) -> Result<Driven, 
         rows: kept.rows,
         longest_step_mm: kept.longest_step_mm,
         outcome,
-        most_samples,
-        memory_mb: most_memory_mb(),
+        max_samples,
+        memory_mb: max_memory_mb(),
     };
     Ok(Driven {
         ran,
@@ -228,7 +228,7 @@ fn forget_most_memory() {
 }
 
 /// Most memory of this process, MB; 0 where the system does not say.
-fn most_memory_mb() -> f64 {
+fn max_memory_mb() -> f64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
     let kilobytes = line.and_then(|rest| {

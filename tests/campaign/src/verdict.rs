@@ -299,11 +299,11 @@ fn ended(ran: &Ran, asked: &Asked) -> Option<Report> {
         let line = ran.rows.last().map_or(0, |row| row.line);
         let words = format!(
             "after {time_s:.2} s ({} samples) it is on line {line}",
-            ran.most_samples
+            ran.max_samples
         );
         let kind = if still {
             "standstill"
-        } else if ran.most_samples == MAX_SAMPLES {
+        } else if ran.max_samples == MAX_SAMPLES {
             "too-long"
         } else {
             "slow"

@@ -4,6 +4,7 @@ use tandem_sdk::{Accepted, Block, BlockReport, Planner, PluginError, Segment, Se
 
 use crate::heap;
 use crate::machine::ROUGH_PERIOD_S;
+use crate::random::Random;
 use crate::timing::Timing;
 
 /// What came out.
@@ -112,6 +113,60 @@ pub fn drive(
         }
     }
     Ok(())
+}
+
+/// Feeds `blocks` a few at a time, as somebody sends them, and advances whether the planner is full or not. Where it emits nothing more
+/// come, or they are late: then it is to plan to the end of those that it has.
+pub fn drive_as_sent(
+    planner: &mut dyn Planner,
+    blocks: &[Block],
+    random: &mut Random,
+    driven: &mut Driven,
+) -> Result<(), Stuck> {
+    let (mut next, mut until, mut finished, mut idle) = (0, 0, false, 0);
+    while idle <= IDLE_CALLS && driven.segments.len() <= blocks.len() * SEGMENTS_PER_BLOCK {
+        while next < until {
+            let accepted = planner
+                .accept(&blocks[next], None)
+                .map_err(|error| failed("accept", &blocks[next], &error))?;
+            if accepted == Accepted::Full {
+                break;
+            }
+            (next, finished) = (next + 1, false);
+        }
+        let before = driven.segments.len();
+        let advanced = planner
+            .advance(ROUGH_PERIOD_S, driven)
+            .map_err(|error| failed("advance", &blocks[next.saturating_sub(1)], &error))?;
+        let segments = driven.segments[before..].iter();
+        let emitted_s: f64 = segments.map(|segment| segment.duration_s).sum();
+        // It may have less than a period that does not depend on what follows.
+        expect(true, advanced.duration_s, emitted_s)?;
+        if advanced.done != 0 && !finished {
+            return Err(Stuck {
+                check: "progress",
+                words: "it says that it is done before it was told that nothing follows".into(),
+            });
+        }
+        if advanced.done != 0 && next == blocks.len() {
+            return Ok(());
+        }
+        idle = if emitted_s > 0.0 { 0 } else { idle + 1 };
+        if emitted_s == 0.0
+            && next == until
+            && !finished
+            && (next == blocks.len() || random.once_in(5))
+        {
+            planner.finish();
+            finished = true;
+        } else if next == until && (!finished || advanced.done != 0) {
+            until = blocks.len().min(until + random.between(0.0, 6.0) as usize);
+        }
+    }
+    Err(Stuck {
+        check: "progress",
+        words: no_progress(next, blocks.len(), driven.segments.len()),
+    })
 }
 
 /// What `advance` says must be what it did.

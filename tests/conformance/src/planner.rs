@@ -4,7 +4,7 @@ use tandem_sdk::{AxisVector, Block, Planner, PlannerDescription, Plugin, Segment
 
 use crate::limits::{self, Sample};
 use crate::machine::{FINE_PERIOD_S, context};
-use crate::motion::{Driven, Stuck, Timings, drive};
+use crate::motion::{Driven, Stuck, Timings, drive, drive_as_sent};
 use crate::random::Random;
 use crate::report::Report;
 use crate::{Setup, heap, joints, nonsense, program};
@@ -33,6 +33,7 @@ pub fn judge(plugin: Plugin, setup: &Setup, report: &mut Report) {
             description,
             timings: &mut timings,
             seed,
+            how: "",
         };
         if let Err(Stuck { check, words }) = judge.program() {
             report.find(check, format!("program seed {seed}: {words}"));
@@ -72,6 +73,8 @@ struct Judge<'a> {
     description: PlannerDescription,
     timings: &'a mut Timings,
     seed: u64,
+    /// How blocks came, in what is found.
+    how: &'static str,
 }
 
 /// No end but the program's.
@@ -100,6 +103,7 @@ impl Judge<'_> {
             self.timings,
         )?;
         self.judge_output(&blocks, &driven);
+        self.judge_as_sent(&mut random, &blocks)?;
         self.judge_determinism(&blocks, &driven)?;
         self.judge_reset(planner.as_mut(), &blocks, &driven)
     }
@@ -115,8 +119,9 @@ impl Judge<'_> {
     fn find(&mut self, check: &'static str, words: Option<String>) {
         self.report.judged(check);
         if let Some(words) = words {
+            let (seed, how) = (self.seed, self.how);
             self.report
-                .find(check, format!("program seed {}: {words}", self.seed));
+                .find(check, format!("program seed {seed}{how}: {words}"));
         }
     }
 
@@ -144,6 +149,17 @@ impl Judge<'_> {
         } else {
             self.find("path", off_the_path(blocks, segments, &samples));
         }
+    }
+
+    /// Blocks that come a few at a time: nothing is asked of the time that they take.
+    fn judge_as_sent(&mut self, random: &mut Random, blocks: &[Block]) -> Result<(), Stuck> {
+        self.how = ", as somebody sends it";
+        let mut driven = Driven::default();
+        let mut planner = self.open(AxisVector::ZERO)?;
+        drive_as_sent(planner.as_mut(), blocks, random, &mut driven)?;
+        self.judge_output(blocks, &driven);
+        self.how = "";
+        Ok(())
     }
 
     /// The same once more, without a `check` before: the same bits.

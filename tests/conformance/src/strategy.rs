@@ -54,13 +54,10 @@ pub fn judge(plugin: Plugin, setup: &Setup, report: &mut Report) {
 }
 
 fn context(max_feed_ratio: f64) -> StrategyContext {
+    let machine = crate::machine::context(AxisVector::ZERO);
     StrategyContext {
-        axis_count: 3,
-        axes: crate::machine::context(AxisVector::ZERO).axes,
-        fine_period_s: FINE_PERIOD_S,
-        rough_period_s: ROUGH_PERIOD_S,
-        max_feed_ratio,
-        joints_are_axes: 1,
+        limits: machine.limits,
+        ..StrategyContext::new(machine.axes, FINE_PERIOD_S, ROUGH_PERIOD_S, max_feed_ratio)
     }
 }
 

@@ -16,7 +16,7 @@ static ENGINE: LazyLock<Engine> = LazyLock::new(|| Engine::new().expect("this pr
 /// The exports of a policy, with every function that it may have.
 const EXPORTS: &str = r#"(module
   (memory (export "memory") 2)
-  (func (export "tandem_policy_v1") (result i32) i32.const 0)
+  (func (export "tandem_policy_v2") (result i32) i32.const 0)
   (func (export "on_blocks") (param i32 i32))
   (func (export "on_period") (param i32) (result f64) f64.const 0)
   (func (export "save") (result i32) i32.const 0)
@@ -88,26 +88,39 @@ impl Reencode for WithLayout {
     }
 }
 
-/// A layout with a window and a period behind it, and no parameters.
+/// A layout with a window and a period behind it, an axis that it looks at, and no parameters.
 fn layout() -> Vec<u8> {
-    let window = LAYOUT + 64;
-    let period = window + (abi::WINDOW_BLOCKS * abi::block::BYTES) as u32;
-    let state = period + abi::period::BYTES as u32;
+    let inputs = LAYOUT + abi::layout::BYTES_V2 as u32;
+    let name = inputs + abi::input::BYTES as u32;
+    let window = name + 8;
+    let period = window + (abi::WINDOW_BLOCKS * abi::block::BYTES_V2) as u32;
+    let state = period + abi::period::BYTES_V2 as u32;
     let fields = [
-        (abi::layout::SIZE, abi::layout::BYTES as u32),
-        (abi::layout::BLOCK_BYTES, abi::block::BYTES as u32),
+        (abi::layout::SIZE, abi::layout::BYTES_V2 as u32),
+        (abi::layout::BLOCK_BYTES, abi::block::BYTES_V2 as u32),
         (abi::layout::WINDOW, window),
         (abi::layout::WINDOW_BLOCKS, abi::WINDOW_BLOCKS as u32),
-        (abi::layout::PERIOD_BYTES, abi::period::BYTES as u32),
+        (abi::layout::PERIOD_BYTES, abi::period::BYTES_V2 as u32),
         (abi::layout::PERIOD, period),
         (abi::layout::PARAMETER_BYTES, abi::parameter::BYTES as u32),
         (abi::layout::STATE, state),
         (abi::layout::STATE_BYTES, 64),
+        (abi::layout::INPUTS, inputs),
+        (abi::layout::INPUT_BYTES, abi::input::BYTES as u32),
+        (abi::layout::INPUT_COUNT, 1),
     ];
-    let mut bytes = vec![0; abi::layout::BYTES];
-    for (place, value) in fields {
+    let input = [
+        (abi::input::SIZE, abi::input::BYTES as u32),
+        (abi::input::KIND, abi::input::AXIS),
+        (abi::input::NAME, name),
+        (abi::input::NAME_BYTES, 1),
+    ];
+    let mut bytes = vec![0; (window - LAYOUT) as usize];
+    let behind = input.map(|(place, value)| (abi::layout::BYTES_V2 + place, value));
+    for (place, value) in fields.into_iter().chain(behind) {
         bytes[place..place + 4].copy_from_slice(&value.to_le_bytes());
     }
+    bytes[(name - LAYOUT) as usize] = b'y';
     bytes
 }
 
@@ -124,7 +137,7 @@ fn exported(module: &[u8], name: &str) -> Option<u32> {
 /// A module of wasm-smith that is a policy.
 fn policy_module(bytes: &[u8]) -> Option<Vec<u8>> {
     let module = wasm_smith::Module::new(config(), &mut Unstructured::new(bytes)).ok()?.to_bytes();
-    let locate = exported(&module, abi::LAYOUT_EXPORT)?;
+    let locate = exported(&module, abi::LAYOUT_EXPORTS[1])?;
     let mut made = Module::new();
     let mut with_layout = WithLayout { locate, next: 0 };
     with_layout.parse_core_module(&mut made, wasmparser::Parser::new(0), &module).ok()?;
@@ -133,7 +146,7 @@ fn policy_module(bytes: &[u8]) -> Option<Vec<u8>> {
 
 fn start(script: Script) -> Option<Policy> {
     let axes = Axes::new(&[('X', false), ('Y', false), ('Z', false)]).expect("three axes");
-    let facts = Facts { axes, time_constant_s: 0.05, path_tolerance_mm: 0.01, rough_period_s: 0.008 };
+    let facts = Facts { axes, time_constant_s: 0.05, path_tolerance_mm: 0.01, rough_period_s: 0.008, tool_diameters_mm: vec![], signals: vec![] };
     Policy::new(script, Values::default(), Budget::default(), Bounds::default(), &facts).ok()
 }
 

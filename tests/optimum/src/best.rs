@@ -10,8 +10,9 @@
 
 use tandem_motion::nurbs::{AlongPath, Place};
 use tandem_motion::retime::{
-    Between, End, LaneLimits, MAX_LANES, PLACES, Point, Rate, Retimer, Task,
+    AnyRetimer, AxisLimits, Between, End, GRID, PLACES, Point, Rate, Task,
 };
+use tandem_sdk::MAX_AXES;
 
 use crate::course::{Course, Limits};
 
@@ -61,7 +62,7 @@ struct Ease {
 pub fn best(course: &Course, limits: &Limits, step_s: f64) -> Best {
     let mut motion = slow(course, limits);
     let mut eases = Vec::new();
-    let mut retimer = Retimer::default();
+    let mut retimer = AnyRetimer::default();
     for factor in ROUNDS {
         motion = turn(
             course,
@@ -120,7 +121,7 @@ fn turn(
     before: &Motion,
     step_s: f64,
     eases: &[Ease],
-    retimer: &mut Retimer,
+    retimer: &mut AnyRetimer,
 ) -> Motion {
     let mut motion = before.on_its_time(step_s, course.length_mm());
     let mut place = Place::default();
@@ -129,7 +130,7 @@ fn turn(
     let mut knot = 0;
     let knots = course.knots_mm();
     for k in 0..motion.intervals() {
-        let states = [0.0, 0.5, 1.0].map(|z| motion.spline(k, z));
+        let states = GRID.map(|z| motion.spline(k, z));
         points.push(states.map(|state| {
             let at = course.at(state[0], &mut place);
             point(
@@ -166,21 +167,17 @@ fn turn(
             });
         }
     }
-    let lanes = limits.jerk_mm_per_s3.len();
-    let lane_limits = |of: &[f64]| -> [f64; MAX_LANES] {
+    let all = |of: &[f64]| -> [f64; MAX_AXES] {
         std::array::from_fn(|n| of.get(n).copied().unwrap_or(f64::INFINITY))
     };
-    // The solver keeps back 1 % of the acceleration for what lies between the places of its grid; this one is finer.
-    let acceleration = lane_limits(&limits.acceleration_mm_per_s2).map(|a| a / 0.99);
     let task = Task {
         points: &points,
         between: &between,
-        limits: LaneLimits {
-            lanes,
-            acceleration,
-            jerk: lane_limits(&limits.jerk_mm_per_s3),
+        limits: AxisLimits {
+            count: limits.jerk_mm_per_s3.len(),
+            acceleration_mm_per_s2: all(&limits.acceleration_mm_per_s2),
+            jerk_mm_per_s3: all(&limits.jerk_mm_per_s3),
         },
-        jerk_share: 1.0,
         step_s: motion.step_s,
         ends: (End::Rest, End::Rest),
     };
@@ -212,7 +209,7 @@ fn point(
     ([_, s1, s2, s3], at): (&[f64; 4], &AlongPath),
     ease: &Ease,
     cap: f64,
-) -> Point {
+) -> Point<MAX_AXES> {
     let mut point = Point {
         jerk_share: ease.jerk,
         acceleration_share: ease.acceleration,

@@ -2,7 +2,7 @@
 
 use tandem_optimum::best::best;
 use tandem_optimum::course::{Course, Limits};
-use tandem_rig::{case, numbers};
+use tandem_rig::case;
 use tandem_sdk::{Axes, AxisVector, NurbsData};
 
 fn limits(lanes: usize, chord_error_mm: f64) -> Limits {
@@ -30,17 +30,7 @@ fn the_published_curves_take_the_published_times() {
             "infinity" => 5.301_854,
             _ => continue,
         };
-        let points = curve["control_points"].as_array().unwrap();
-        let data = NurbsData {
-            degree: curve["degree"].as_u64().unwrap() as usize,
-            control_points: points
-                .iter()
-                .map(|p| AxisVector::from_slice(&numbers(p)))
-                .collect(),
-            weights: numbers(&curve["weights"]),
-            knots: numbers(&curve["knots"]),
-        };
-        let course = Course::new(&data, &axes).unwrap();
+        let course = Course::new(&tandem_rig::curve(curve), &axes).unwrap();
         let found = best(&course, &limits(2, 0.001), 0.25e-3);
         println!("{name}: {found:?}, published {published_s}");
         let share = found.kept_s / published_s;

@@ -35,14 +35,14 @@ fn smooth_at_a_micrometre_is_near_the_exact_curve() {
 
 #[test]
 fn scan_is_near_the_shortest_time() {
-    for (name, most, most_of_all) in [
+    for (name, most, greatest) in [
         ("scan-paper", 1.01, 1.03),
         ("scan-gentle", 1.04, 1.06),
         ("scan-jumps-gentle", 1.13, 1.25),
     ] {
         let (middle, worst) = ratios(name);
         assert!(
-            middle < most && worst < most_of_all,
+            middle < most && worst < greatest,
             "{name}: {middle} {worst}"
         );
     }

@@ -4,11 +4,11 @@ use std::ops::RangeInclusive;
 
 use crate::{
     Kind, Machine, Options, Position, Row,
-    follow::Followed,
+    follow::{Followed, ranges},
     geometry::minus,
     judge::Report,
     limits::speed_rounding,
-    path::{Element, Feed, Place},
+    path::{Element, Feed, PathPosition},
     vertices::{length_to_mm, lengths_mm},
 };
 
@@ -51,6 +51,7 @@ pub fn judge_feed(
     };
     let window = options.feed_window_samples(machine);
     let last = followed.links.len() - 1;
+    let mut wide: Option<Vec<(PathPosition, PathPosition)>> = None;
     for sample in 1..=last {
         let moved = minus(&rows[sample].command, &rows[sample - 1].command);
         if moved.iter().all(|&distance| distance == 0.0) {
@@ -59,32 +60,60 @@ pub fn judge_feed(
         let place = |sample: usize| followed.places[followed.links[sample]];
         let from = place((sample - 1).saturating_sub(window));
         let to = place((sample + window).min(last));
-        judge.judge(
-            sample,
-            &moved,
-            &rows[sample].command,
-            &judge.touched(from, to),
-            report,
-        );
+        let at = &rows[sample].command;
+        let mut touched = judge.touched(from, to);
+        if !judge.is_kept(&moved, at, &touched) {
+            // Where the path comes by again within its tolerance, the nearest place may be one of another block than moves. The
+            // one that the record names counts too, where it may be that.
+            let wide =
+                wide.get_or_insert_with(|| ranges(elements, followed, options).unwrap_or_default());
+            if let Some((first, last)) = wide.get(followed.links[sample]) {
+                let named = &elements[first.element..=last.element];
+                for element in named.iter().filter(|it| it.line == rows[sample].line) {
+                    touched.add(element);
+                }
+            }
+        }
+        judge.judge(sample, &moved, at, &touched, report);
+    }
+}
+
+impl Touched {
+    fn add(&mut self, element: &Element) {
+        match element.feed {
+            Feed::Rapid => self.rapids = true,
+            Feed::PerSecond(feed) if element.moves_linear => {
+                raise(&mut self.linear_mm_per_s, feed);
+            }
+            Feed::PerSecond(feed) => raise(&mut self.rotary_deg_per_s, feed),
+        }
+    }
+
+    /// The feed that counts, and whether it is one of rotary axes; none where a rapid does.
+    fn feed(&self) -> Option<(f64, bool)> {
+        match *self {
+            Self { rapids: true, .. } => None,
+            Self {
+                linear_mm_per_s: Some(feed),
+                ..
+            } => Some((feed, false)),
+            Self {
+                rotary_deg_per_s, ..
+            } => rotary_deg_per_s.map(|feed| (feed, true)),
+        }
     }
 }
 
 impl FeedJudge<'_> {
-    fn touched(&self, from: Place, to: Place) -> Touched {
+    fn touched(&self, from: PathPosition, to: PathPosition) -> Touched {
         let mut touched = Touched::default();
         for element in &self.elements[self.range(from, to)] {
-            match element.feed {
-                Feed::Rapid => touched.rapids = true,
-                Feed::PerSecond(feed) if element.moves_linear => {
-                    raise(&mut touched.linear_mm_per_s, feed);
-                }
-                Feed::PerSecond(feed) => raise(&mut touched.rotary_deg_per_s, feed),
-            }
+            touched.add(element);
         }
         touched
     }
 
-    fn range(&self, from: Place, to: Place) -> RangeInclusive<usize> {
+    fn range(&self, from: PathPosition, to: PathPosition) -> RangeInclusive<usize> {
         let (mut first, mut last) = (from.element, to.element);
         let from_mm = length_to_mm(&self.lengths_mm, from) - self.slack_mm;
         let to_mm = length_to_mm(&self.lengths_mm, to) + self.slack_mm;
@@ -105,27 +134,26 @@ impl FeedJudge<'_> {
         touched: &Touched,
         report: &mut Report,
     ) {
-        let feed = match *touched {
-            // Where a rapid and a feed meet, the limits of the axes alone hold.
-            Touched {
-                rapids: true,
-                linear_mm_per_s: None,
-                rotary_deg_per_s: None,
-            } => {
-                return self.judge_rapid(sample, moved, at, report);
-            }
-            Touched { rapids: true, .. } => return,
-            Touched {
-                linear_mm_per_s: Some(feed),
-                ..
-            } => (feed, false),
-            Touched {
-                rotary_deg_per_s: Some(feed),
-                ..
-            } => (feed, true),
-            Touched { .. } => return,
-        };
-        self.judge_path_speed(sample, moved, at, feed, report);
+        if let Some(feed) = touched.feed() {
+            return self.judge_path_speed(sample, moved, at, feed, report);
+        }
+        // Where a rapid and a feed meet, the limits of the axes alone hold.
+        if touched.rapids
+            && touched
+                .linear_mm_per_s
+                .or(touched.rotary_deg_per_s)
+                .is_none()
+        {
+            self.judge_rapid(sample, moved, at, report);
+        }
+    }
+
+    /// Whether a feed that counts is kept.
+    fn is_kept(&self, moved: &Position, at: &Position, touched: &Touched) -> bool {
+        touched.feed().is_none_or(|feed| {
+            let (speed, most) = self.speed(moved, at, feed);
+            speed <= most
+        })
     }
 
     /// Axis by axis, for rapids have no path speed of their own.
@@ -148,6 +176,16 @@ impl FeedJudge<'_> {
         (feed, rotary): (f64, bool),
         report: &mut Report,
     ) {
+        let (speed, most) = self.speed(moved, at, (feed, rotary));
+        let limit = feed * self.options.max_ratio;
+        report.maxima.feed_ratio = report.maxima.feed_ratio.max(speed / feed);
+        if speed > most {
+            report.add(Kind::Feed, sample, None, speed, limit);
+        }
+    }
+
+    /// How fast the axes move that a feed counts, and the most that is forgiven.
+    fn speed(&self, moved: &Position, at: &Position, (feed, rotary): (f64, bool)) -> (f64, f64) {
         let counted = self
             .machine
             .axes
@@ -159,13 +197,12 @@ impl FeedJudge<'_> {
             squared += moved[axis].powi(2);
             magnitude_mm = magnitude_mm.max(at[axis].abs());
         }
-        let speed = squared.sqrt() / self.machine.fine_period_s;
-        let limit = feed * self.options.max_ratio;
-        report.maxima.feed_ratio = report.maxima.feed_ratio.max(speed / feed);
         let rounding = 2.0 * speed_rounding(magnitude_mm, self.machine.fine_period_s);
-        if speed > limit * (1.0 + self.options.feed_tolerance) + rounding {
-            report.add(Kind::Feed, sample, None, speed, limit);
-        }
+        let limit = feed * self.options.max_ratio;
+        (
+            squared.sqrt() / self.machine.fine_period_s,
+            limit * (1.0 + self.options.feed_tolerance) + rounding,
+        )
     }
 }
 

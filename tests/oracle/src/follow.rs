@@ -2,7 +2,7 @@
 
 use crate::{
     Options, Position,
-    path::{Element, Path, Place},
+    path::{Element, Path, PathPosition},
     walk::Walker,
 };
 
@@ -22,11 +22,11 @@ pub struct Followed {
     /// The link of each sample.
     pub links: Vec<usize>,
     /// The place of each link; places never go back.
-    pub places: Vec<Place>,
+    pub places: Vec<PathPosition>,
     /// Links off the path, with their distance from it.
     pub misses: Vec<(usize, f64)>,
     /// Where the walk ended.
-    pub end: Place,
+    pub end: PathPosition,
     /// Greatest distance of a sample from the path, mm.
     pub deviation_mm: f64,
 }
@@ -73,7 +73,7 @@ pub fn ranges(
     elements: &[Element],
     followed: &Followed,
     options: &Options,
-) -> Option<Vec<(Place, Place)>> {
+) -> Option<Vec<(PathPosition, PathPosition)>> {
     let walker = Walker::new(elements, options);
     let Some((cap_mm, first)) = widest_tolerance(&walker, &followed.chain) else {
         return walker.any_ranges(&followed.chain);
@@ -99,14 +99,14 @@ impl Followed {
             links,
             places,
             misses,
-            end: Place::default(),
+            end: PathPosition::default(),
             deviation_mm: 0.0,
         }
     }
 
     /// Takes the nearest place between the first and the last that a sample may have.
-    fn settle(&mut self, elements: &[Element], first: &[Place], latest: &[Place]) {
-        let mut before = Place::default();
+    fn settle(&mut self, elements: &[Element], first: &[PathPosition], latest: &[PathPosition]) {
+        let mut before = PathPosition::default();
         for ((sample, &first), &latest) in self.chain.iter().zip(first).zip(latest) {
             let low = if first > before { first } else { before };
             let (place, off_mm) = nearest_between(
@@ -123,11 +123,11 @@ impl Followed {
 }
 
 /// The smallest tolerance with which the walk succeeds, and that walk; none where the allowed one is too small.
-fn smallest_tolerance(walker: &Walker, chain: &[Position]) -> Option<(f64, Vec<Place>)> {
+fn smallest_tolerance(walker: &Walker, chain: &[Position]) -> Option<(f64, Vec<PathPosition>)> {
     let walk = |cap_mm| {
         walker
             .capped(cap_mm)
-            .strict(Place::default(), chain.iter().copied())
+            .strict(PathPosition::default(), chain.iter().copied())
     };
     let (mut high_mm, mut places) = widest_tolerance(walker, chain)?;
     let mut low_mm = SMALLEST_DEVIATION_MM;
@@ -144,11 +144,11 @@ fn smallest_tolerance(walker: &Walker, chain: &[Position]) -> Option<(f64, Vec<P
 /// The widest tolerance with which the walk succeeds, and that walk. With a wide one it may dawdle on a piece that the samples
 /// have left, until the next vertex is out of reach; one that keeps closer to the samples does not. Each of them that succeeds
 /// is a proof.
-fn widest_tolerance(walker: &Walker, chain: &[Position]) -> Option<(f64, Vec<Place>)> {
+fn widest_tolerance(walker: &Walker, chain: &[Position]) -> Option<(f64, Vec<PathPosition>)> {
     let walk = |cap_mm| {
         walker
             .capped(cap_mm)
-            .strict(Place::default(), chain.iter().copied())
+            .strict(PathPosition::default(), chain.iter().copied())
     };
     let mut caps = (0..NARROWER).map(|times| walker.widest_mm() / f64::from(1u32 << times));
     caps.find_map(|cap_mm| Some((cap_mm, walk(cap_mm)?)))
@@ -157,17 +157,17 @@ fn widest_tolerance(walker: &Walker, chain: &[Position]) -> Option<(f64, Vec<Pla
 /// The last places that samples may have: the first ones on the way back.
 fn latest(
     elements: &[Element],
-    end: Place,
+    end: PathPosition,
     chain: &[Position],
     cap_mm: f64,
     options: &Options,
-) -> Option<Vec<Place>> {
+) -> Option<Vec<PathPosition>> {
     let back: Vec<Element> = elements[..=end.element]
         .iter()
         .rev()
         .map(reversed)
         .collect();
-    let start = Place {
+    let start = PathPosition {
         element: 0,
         fraction: 1.0 - end.fraction,
     };
@@ -175,7 +175,7 @@ fn latest(
         .capped(cap_mm)
         .strict(start, chain.iter().rev().copied())?;
     for place in &mut places {
-        *place = Place {
+        *place = PathPosition {
             element: end.element - place.element,
             fraction: 1.0 - place.fraction,
         };
@@ -193,10 +193,10 @@ fn reversed(element: &Element) -> Element {
 
 fn nearest_between(
     elements: &[Element],
-    low: Place,
-    high: Place,
+    low: PathPosition,
+    high: PathPosition,
     sample: &Position,
-) -> (Place, f64) {
+) -> (PathPosition, f64) {
     let mut best = (low, f64::INFINITY);
     for (index, element) in elements
         .iter()
@@ -216,7 +216,7 @@ fn nearest_between(
         };
         if let Some((fraction, off_mm)) = element.shape.nearer(sample, (from, to), best.1) {
             best = (
-                Place {
+                PathPosition {
                     element: index,
                     fraction,
                 },

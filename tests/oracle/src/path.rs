@@ -57,7 +57,7 @@ pub enum Feed {
 
 /// A place on the path; places compare in the order of travel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
-pub struct Place {
+pub struct PathPosition {
     pub element: usize,
     /// From 0 at the start of the element to 1 at its end.
     pub fraction: f64,

@@ -7,7 +7,7 @@
 use crate::{
     Position,
     geometry::distance_to_chord,
-    path::{Element, Place},
+    path::{Element, PathPosition},
 };
 
 /// Looks at elements after which it is given up.
@@ -70,8 +70,13 @@ pub fn find(
 
 impl Known {
     /// One place for each sample: from the last one back, the nearest from which the one behind it is reached.
-    pub fn nearest(&self, elements: &[Element], samples: &[Position], reach_mm: f64) -> Vec<Place> {
-        let mut places: Vec<Place> = Vec::with_capacity(samples.len());
+    pub fn nearest(
+        &self,
+        elements: &[Element],
+        samples: &[Position],
+        reach_mm: f64,
+    ) -> Vec<PathPosition> {
+        let mut places: Vec<PathPosition> = Vec::with_capacity(samples.len());
         for (index, sample) in samples.iter().enumerate().rev() {
             let until = self
                 .begins
@@ -83,7 +88,7 @@ impl Known {
             let is_passed = |of: &usize| {
                 distance_to_chord(&elements[*of].shape.at(1.0), sample, next) <= reach_mm
             };
-            let mut best = (Place::default(), f64::INFINITY);
+            let mut best = (PathPosition::default(), f64::INFINITY);
             for &(element, first) in self.places[self.begins[index]..until].iter().rev() {
                 let last = match behind {
                     Some(behind) if element > behind.element => continue,
@@ -99,7 +104,7 @@ impl Known {
                         .shape
                         .nearer(sample, (first, last), best.1)
                 {
-                    best = (Place { element, fraction }, off_mm);
+                    best = (PathPosition { element, fraction }, off_mm);
                 }
             }
             places.push(best.0);
@@ -114,7 +119,7 @@ impl Known {
         elements: &[Element],
         samples: &[Position],
         reach_mm: f64,
-    ) -> Vec<(Place, Place)> {
+    ) -> Vec<(PathPosition, PathPosition)> {
         let mut ranges = Vec::with_capacity(samples.len());
         let mut behind: Vec<usize> = Vec::new();
         for (index, sample) in samples.iter().enumerate().rev() {
@@ -141,9 +146,9 @@ impl Known {
                 }
             }
             alive.reverse();
-            let place = |&(element, fraction): &(usize, f64)| Place { element, fraction };
+            let place = |&(element, fraction): &(usize, f64)| PathPosition { element, fraction };
             let first = alive.first().map(place).unwrap_or_default();
-            let last = alive.last().map_or(first, |(element, _)| Place {
+            let last = alive.last().map_or(first, |(element, _)| PathPosition {
                 element: *element,
                 fraction: 1.0,
             });

@@ -4,7 +4,7 @@ use crate::{
     Options, Position,
     follow::{self, Followed},
     geometry::{distance, distance_to_chord},
-    path::{Element, Place},
+    path::{Element, PathPosition},
 };
 
 /// Chords searched on each side of a vertex; only samples astray or all but at rest come in greater numbers.
@@ -91,13 +91,13 @@ pub fn lengths_mm(elements: &[Element]) -> Vec<f64> {
 }
 
 /// Length from the start of the path to a place, mm.
-pub fn length_to_mm(lengths_mm: &[f64], place: Place) -> f64 {
+pub fn length_to_mm(lengths_mm: &[f64], place: PathPosition) -> f64 {
     let start_mm = lengths_mm[place.element];
     start_mm + place.fraction * (lengths_mm[place.element + 1] - start_mm)
 }
 
-fn end_of(element: usize) -> Place {
-    Place {
+fn end_of(element: usize) -> PathPosition {
+    PathPosition {
         element,
         fraction: 1.0,
     }
@@ -154,7 +154,7 @@ impl<'a> Laid<'a> {
     }
 
     /// The same from every chord that may belong to the vertex, by the places between which each link may be.
-    fn distance_of_all_mm(&self, vertex: usize, ranges: &[(Place, Place)]) -> f64 {
+    fn distance_of_all_mm(&self, vertex: usize, ranges: &[(PathPosition, PathPosition)]) -> f64 {
         let element = &self.elements[vertex];
         let (point, end) = (element.shape.at(1.0), end_of(vertex));
         let first = ranges

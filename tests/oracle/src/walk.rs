@@ -8,7 +8,7 @@
 use crate::{
     Options, Position,
     geometry::{distance, distance_to_chord},
-    path::{Element, Place},
+    path::{Element, PathPosition},
     places,
 };
 
@@ -29,7 +29,7 @@ pub struct Walker<'a> {
 /// A walk that went on past samples off the path.
 pub struct Walk {
     /// One place for each sample.
-    pub places: Vec<Place>,
+    pub places: Vec<PathPosition>,
     /// Samples off the path, with their distance from it.
     pub misses: Vec<(usize, f64)>,
 }
@@ -62,9 +62,9 @@ impl<'a> Walker<'a> {
     /// The first places of all samples, if each has one.
     pub fn strict(
         &self,
-        from: Place,
+        from: PathPosition,
         samples: impl Iterator<Item = Position>,
-    ) -> Option<Vec<Place>> {
+    ) -> Option<Vec<PathPosition>> {
         let mut places = Vec::with_capacity(samples.size_hint().0);
         let (mut place, mut previous) = (from, None);
         for sample in samples {
@@ -78,7 +78,7 @@ impl<'a> Walker<'a> {
     }
 
     /// A place of every sample, if there are any at all: not always the first ones, which may lead nowhere.
-    pub fn any(&self, samples: &[Position]) -> Option<Vec<Place>> {
+    pub fn any(&self, samples: &[Position]) -> Option<Vec<PathPosition>> {
         Some(
             self.known(samples)?
                 .nearest(self.elements, samples, self.reach_mm),
@@ -86,7 +86,7 @@ impl<'a> Walker<'a> {
     }
 
     /// Between which places each sample may be then.
-    pub fn any_ranges(&self, samples: &[Position]) -> Option<Vec<(Place, Place)>> {
+    pub fn any_ranges(&self, samples: &[Position]) -> Option<Vec<(PathPosition, PathPosition)>> {
         Some(
             self.known(samples)?
                 .ranges(self.elements, samples, self.reach_mm),
@@ -108,7 +108,7 @@ impl<'a> Walker<'a> {
             places: Vec::with_capacity(samples.len()),
             misses: Vec::new(),
         };
-        let mut place = Place::default();
+        let mut place = PathPosition::default();
         let (mut astray_mm, mut search_at_mm) = (0.0, f64::INFINITY);
         for (index, sample) in samples.iter().enumerate() {
             let previous = &samples[index.saturating_sub(1)];
@@ -133,12 +133,12 @@ impl<'a> Walker<'a> {
     }
 
     /// Where the walk ends: the end of the path if the last sample has reached it, else the place nearest to it.
-    pub fn end(&self, from: Place, sample: &Position) -> Place {
+    pub fn end(&self, from: PathPosition, sample: &Position) -> PathPosition {
         let (mut best, mut best_mm, mut low) = (from, f64::INFINITY, from.fraction);
         for (index, element) in self.elements.iter().enumerate().skip(from.element) {
             if let Some((fraction, off_mm)) = element.shape.nearer(sample, (low, 1.0), best_mm) {
                 (best, best_mm) = (
-                    Place {
+                    PathPosition {
                         element: index,
                         fraction,
                     },
@@ -150,7 +150,7 @@ impl<'a> Walker<'a> {
                 return best;
             }
             if index + 1 == self.elements.len() && to_vertex_mm <= self.tolerance_mm(element) {
-                return Place {
+                return PathPosition {
                     element: index,
                     fraction: 1.0,
                 };
@@ -166,13 +166,18 @@ impl<'a> Walker<'a> {
             .min(self.cap_mm)
     }
 
-    fn next(&self, from: Place, previous: &Position, sample: &Position) -> Result<Place, f64> {
+    fn next(
+        &self,
+        from: PathPosition,
+        previous: &Position,
+        sample: &Position,
+    ) -> Result<PathPosition, f64> {
         self.search(from, sample, |vertex| {
             distance_to_chord(vertex, previous, sample) <= self.reach_mm
         })
     }
 
-    fn ahead(&self, from: Place, astray_mm: f64, sample: &Position) -> Option<Place> {
+    fn ahead(&self, from: PathPosition, astray_mm: f64, sample: &Position) -> Option<PathPosition> {
         let mut left_mm = SEARCH_AHEAD * astray_mm + self.reach_mm;
         let mut before = self.elements[from.element].shape.at(from.fraction);
         let go_on = |vertex: &Position| {
@@ -186,10 +191,10 @@ impl<'a> Walker<'a> {
     /// The first place from `from` on that is within tolerance of a sample, or the distance to what was searched.
     fn search(
         &self,
-        from: Place,
+        from: PathPosition,
         sample: &Position,
         mut may_pass: impl FnMut(&Position) -> bool,
-    ) -> Result<Place, f64> {
+    ) -> Result<PathPosition, f64> {
         let (mut nearest_mm, mut low) = (f64::INFINITY, from.fraction);
         for (index, element) in self.elements.iter().enumerate().skip(from.element) {
             if let Some(fraction) =
@@ -197,7 +202,7 @@ impl<'a> Walker<'a> {
                     .shape
                     .first_within(sample, self.tolerance_mm(element), low)
             {
-                return Ok(Place {
+                return Ok(PathPosition {
                     element: index,
                     fraction,
                 });

@@ -1,7 +1,7 @@
 //! The reference cases of `tests/fixtures/cases`.
 
 use serde_json::Value;
-use tandem_sdk::AxisVector;
+use tandem_sdk::{AxisVector, NurbsData};
 
 /// The case called `name`.
 ///
@@ -53,4 +53,27 @@ pub fn assert_close(actual: &[f64], expected: &[f64], tolerance: f64) {
             "entry {index}: {a} instead of {e}"
         );
     }
+}
+
+/// The curve of an entry of the case `002_nurbs_eval`.
+///
+/// # Panics
+/// It is something else.
+pub fn curve(entry: &Value) -> NurbsData {
+    NurbsData {
+        degree: entry["degree"].as_u64().unwrap() as usize,
+        control_points: points(&entry["control_points"]),
+        weights: numbers(&entry["weights"]),
+        knots: numbers(&entry["knots"]),
+    }
+}
+
+/// The entry `name` of the case `002_nurbs_eval`.
+///
+/// # Panics
+/// There is none.
+pub fn canonical_curve(name: &str) -> Value {
+    let case = case("002_nurbs_eval");
+    let curves = case["curves"].as_array().unwrap();
+    curves.iter().find(|c| c["name"] == name).unwrap().clone()
 }

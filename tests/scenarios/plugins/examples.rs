@@ -58,7 +58,7 @@ fn a_feed_strategy_lowers_the_feed_and_shows_its_signal() {
         "--set",
         "driver.options.model=second-order",
         "--set",
-        "feed_strategy.options.most_current_a=0.03",
+        "feed_strategy.options.max_current_a=0.03",
     ];
     let plain = Scenario::text(CIRCLES).with(&settings[..2]).run();
     let done = with(Scenario::text(CIRCLES).with(&settings), &strategy).run();

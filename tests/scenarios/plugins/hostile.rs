@@ -106,6 +106,7 @@ const METHODS: &[(&str, &str, &[u32])] = &[
     ("feed_strategy", "new", &[1]),
     ("feed_strategy", "signals", &[1]),
     ("feed_strategy", "max_ratio_change_per_s", &[1]),
+    ("feed_strategy", "takes_override", &[1]),
     ("feed_strategy", "update", &[1, 2, 50]),
     ("driver", "new", &[1]),
     ("driver", "describe", &[1]),
@@ -461,7 +462,12 @@ fn the_conformance_kit_finds_it_out() {
         ),
         (
             "feed strategy",
-            &["signals", "max_ratio_change_per_s", "update"],
+            &[
+                "signals",
+                "max_ratio_change_per_s",
+                "takes_override",
+                "update",
+            ],
         ),
         (
             "driver",

@@ -103,7 +103,7 @@ pub fn shown(status: &Value) -> String {
         String::new()
     };
     format!(
-        "{}  machine {}  {} {}  F{:.0} S{:.0} T{:.0}  line {:.0}{fault}",
+        "{}  machine {}  {} {}  F{:.0} S{:.0} T{:.0}  line {:.0}{}{fault}",
         text("state"),
         letters(&status["position"]),
         text("system"),
@@ -112,7 +112,19 @@ pub fn shown(status: &Value) -> String {
         number("spindle_rpm"),
         number("tool"),
         number("line"),
+        bus(&status["bus"]),
     )
+}
+
+/// How well the drives are heard, where they are on a bus.
+fn bus(bus: &Value) -> String {
+    let Some(age) = bus["feedback_age_periods"].as_u64() else {
+        return String::new();
+    };
+    let late = &bus["old_feedback_periods"];
+    let phase = bus["phase_us"].as_f64();
+    let phase = phase.map_or(String::new(), |us| format!(", phase {us:+.1} µs"));
+    format!("  bus age {age}, late or lost {late}{phase}")
 }
 
 /// Coordinates in few characters: `X1.000 Y2.000`.

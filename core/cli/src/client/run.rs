@@ -27,6 +27,7 @@ pub fn run(at: &args::Connect, options: &args::Run) -> Result<u8, Box<dyn Error>
         (operator.listen_tcp.is_some(), "--listen-tcp"),
         (options.trace.is_some(), "--trace"),
         (options.blocks.is_some(), "--blocks"),
+        (options.rough.is_some(), "--rough"),
         (options.events.is_some(), "--events"),
         (options.report.is_some(), "--report"),
         (options.reference_time_s.is_some(), "--reference-time-s"),

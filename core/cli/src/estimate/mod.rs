@@ -10,7 +10,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::thread;
 
-use tandem_estimate::{Choice, Estimate, model_file, program_errors};
+use tandem_estimate::{Choice, Estimate, measurements, model_file, program_errors};
 use tandem_host::{Switches, with_stand_ins};
 use tandem_machine::Machine;
 
@@ -55,10 +55,14 @@ pub fn estimate(options: &args::Estimate) -> Result<u8, Box<dyn Error>> {
             }
         }
     }
+    let measured = match &options.measured {
+        Some(path) => measurements::read_programs(path)?,
+        None => vec![],
+    };
     let text = if options.json {
-        shown::json(&estimates)
+        shown::json(&estimates, &measured)
     } else {
-        shown::table(&estimates)
+        shown::table(&estimates) + &shown::beside(&estimates, &measured)
     };
     // A reader that has gone away (a closed pipe) is no reason to fail.
     let _ = std::io::stdout().write_all(text.as_bytes());

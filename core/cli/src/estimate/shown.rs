@@ -3,6 +3,8 @@
 use std::fmt::Write as _;
 
 use serde_json::{Value, json};
+use tandem_estimate::measured::{Beside, causes};
+use tandem_estimate::measurements::ProgramTime;
 use tandem_estimate::{Estimate, Part};
 
 /// The table, with a row for each tool where there are several.
@@ -68,9 +70,72 @@ pub fn table(estimates: &[Estimate]) -> String {
     text
 }
 
+/// The estimates beside what was measured, where anything was, and what the differences come from.
+pub fn beside(estimates: &[Estimate], measured: &[ProgramTime]) -> String {
+    let pairs: Vec<(&Estimate, Beside)> = estimates
+        .iter()
+        .filter_map(|estimate| Some((estimate, Beside::of(estimate, measured)?)))
+        .collect();
+    if pairs.is_empty() {
+        return String::new();
+    }
+    let widest = pairs
+        .iter()
+        .map(|(estimate, _)| estimate.program.chars().count())
+        .max()
+        .unwrap_or(0)
+        .max(7);
+    let mut text = format!(
+        "\n{:widest$}  {:>11} {:>11} {:>8}\n",
+        "program", "measured, s", "estimate, s", "off, %"
+    );
+    for (estimate, beside) in &pairs {
+        let within = if beside.is_within_reading() {
+            "  within the reading"
+        } else {
+            ""
+        };
+        let _ = writeln!(
+            text,
+            "{:widest$}  {:11.3} {:11.3} {:+8.2}{within}",
+            estimate.program,
+            beside.measured_s,
+            beside.estimated_s,
+            100.0 * beside.residual()
+        );
+    }
+    match causes(&pairs) {
+        Ok(causes) => {
+            for cause in causes {
+                let _ = writeln!(
+                    text,
+                    "{}: {:+.3} ms for each {}",
+                    cause.name,
+                    1e3 * cause.missing_s,
+                    cause.unit
+                );
+            }
+        }
+        Err(_) => {
+            text.push_str("these programs are too few, or too much alike, to tell causes apart\n");
+        }
+    }
+    text
+}
+
 /// The list as JSON.
-pub fn json(estimates: &[Estimate]) -> String {
-    let list: Vec<Value> = estimates.iter().map(object).collect();
+pub fn json(estimates: &[Estimate], measured: &[ProgramTime]) -> String {
+    let list: Vec<Value> = estimates
+        .iter()
+        .map(|estimate| {
+            let mut value = object(estimate);
+            if let Some(beside) = Beside::of(estimate, measured) {
+                value["measured_s"] = beside.measured_s.into();
+                value["reading_error_s"] = beside.reading_error_s.into();
+            }
+            value
+        })
+        .collect();
     format!("{:#}\n", Value::Array(list))
 }
 

@@ -16,9 +16,8 @@ use tandem_session::HOMING;
 use tandem_session::jog::{JogController, JogSession};
 use tandem_session::operator::OperatorHub;
 
-use crate::broken::Broken;
 use crate::operator::{Keyboard, Operator, Presence, Signals, is_on_terminal};
-use crate::trace::TraceSink;
+use crate::session_record::SessionRecord;
 use crate::{FAULT, REFUSED, args, built_in};
 
 use input::{Inputs, Script};
@@ -62,12 +61,15 @@ pub fn jog(options: &args::Jog) -> Result<u8, Box<dyn Error>> {
         .keys
         .then(|| take_keys(&shared, session.jogs()))
         .transpose()?;
-    let mut sinks = Sinks::new(Arc::clone(&shared));
+    let mut sinks = Sinks {
+        shared: Arc::clone(&shared),
+        record: SessionRecord::default(),
+    };
     let faulted = loop {
         let run = session.enable()?;
         sinks.begin(options, &machine, session.jogs(), &run)?;
         let outcome = run.drive(clock, &[], &mut sinks)?;
-        sinks.begin_fault(&outcome.summary);
+        sinks.record.begin_fault(&outcome.summary);
         for warning in outcome.summary.warnings() {
             shared.say(&format!("warning: {warning}"));
         }
@@ -88,12 +90,8 @@ pub fn jog(options: &args::Jog) -> Result<u8, Box<dyn Error>> {
         }
     };
     drop(keyboard);
-    let Sinks {
-        trace, mut broken, ..
-    } = sinks;
-    broken.note(trace.map_or(Ok(()), TraceSink::finish));
-    broken.tell();
-    Ok(if faulted || broken.is_any() {
+    let is_broken = sinks.record.finish();
+    Ok(if faulted || is_broken {
         FAULT
     } else {
         u8::from(shared.has_refused()) * REFUSED
@@ -118,33 +116,13 @@ fn waits_for_reset(input: &Inputs, shared: &Shared, real_time: bool) -> Result<b
     Ok(input.is_reset())
 }
 
-/// What is kept of all runs of a session.
+/// What is kept of all runs of a session, and who hears of it.
 struct Sinks {
     shared: Arc<Shared>,
-    trace: Option<TraceSink>,
-    operator: Option<Operator>,
-    /// Tick of the session at which the run began: a trace goes on after a reset.
-    first_tick: u64,
-    next_tick: u64,
-    /// What has been said: what the computer does not grant is said once, not in every run.
-    noted: Vec<String>,
-    /// The trace, where it could not be written to its end.
-    broken: Broken,
+    record: SessionRecord,
 }
 
 impl Sinks {
-    fn new(shared: Arc<Shared>) -> Self {
-        Self {
-            shared,
-            trace: None,
-            operator: None,
-            first_tick: 0,
-            next_tick: 0,
-            noted: vec![],
-            broken: Broken::default(),
-        }
-    }
-
     fn begin(
         &mut self,
         options: &args::Jog,
@@ -152,9 +130,8 @@ impl Sinks {
         jogs: &Arc<JogController>,
         run: &Run,
     ) -> Result<(), String> {
-        if let (None, Some(path)) = (&self.trace, &options.session.trace) {
-            self.trace = Some(TraceSink::create(path, machine, "jogging", run, false)?);
-        }
+        let trace = options.session.trace.as_deref();
+        self.record.begin_trace(trace, machine, "jogging", run)?;
         let hub =
             OperatorHub::new(machine, run.controls(), run.status()).with_jogs(Arc::clone(jogs));
         let presence = Presence {
@@ -164,64 +141,38 @@ impl Sinks {
         };
         let operator = Operator::at(Arc::new(hub), &options.session.operator, presence)?;
         self.shared.follow(&operator);
-        self.operator = Some(operator);
-        self.first_tick = self.next_tick;
+        self.record.begin(operator);
         Ok(())
-    }
-
-    /// Behind a run: clients may take its fault back, where it has one.
-    fn begin_fault(&mut self, summary: &Summary) {
-        if let (Some(operator), Some(fault)) = (&mut self.operator, &summary.fault) {
-            operator.begin_fault(fault);
-        }
     }
 
     fn end(&mut self, mut summary: Summary) {
         // A jog that is stopped is the order of the day.
         summary.stopped = None;
-        if let Some(mut operator) = self.operator.take() {
-            operator.end(&summary);
-        }
+        self.record.end(&summary);
     }
 }
 
 impl RunObserver for Sinks {
     fn broken_record(&mut self) -> Option<String> {
-        self.broken.tell()
+        self.record.broken_record()
     }
 
     fn note(&mut self, note: &str) {
-        if !self.noted.iter().any(|said| said == note) {
-            self.noted.push(note.to_string());
+        if self.record.is_new(note) {
             self.shared.say(note);
         }
     }
 
     fn is_attended(&self) -> bool {
-        self.operator.as_ref().is_some_and(Operator::is_attended)
+        self.record.is_attended()
     }
 
     fn command(&mut self, command: &Timed) {
-        if let Some(trace) = &mut self.trace {
-            self.broken.note(trace.command(&Timed {
-                tick: self.first_tick + command.tick,
-                ..*command
-            }));
-        }
+        self.record.command(command);
     }
 
     fn sample(&mut self, sample: &Sample, _deviation_mm: f64, signals: &[f64]) {
-        let sample = Sample {
-            tick: self.first_tick + sample.tick,
-            ..*sample
-        };
-        self.next_tick = sample.tick + 1;
+        let sample = self.record.sample(sample, signals);
         self.shared.sample(&sample);
-        if let Some(operator) = &self.operator {
-            operator.sample(&sample, 1.0);
-        }
-        if let Some(trace) = &mut self.trace {
-            self.broken.note(trace.sample(&sample, signals));
-        }
     }
 }

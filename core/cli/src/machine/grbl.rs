@@ -214,7 +214,7 @@ fn reason(setting: u32) -> &'static str {
         11 => "corners are driven within motion.path_tolerance_mm, not by a junction deviation",
         12 => "arcs are driven as arcs, not as chords",
         20 => "the travel is always kept",
-        21 => "a limit switch is an input with the role limit (docs/drives.md)",
+        21 => "a limit switch is an input with the role limit (docs/faults.md)",
         22..=27 | 43..=47 => {
             "homing needs the input of each switch: the file has its speeds as remarks (docs/homing.md)"
         }

@@ -1,9 +1,10 @@
 //! Lines of standard input, one when it is asked for.
 
-use std::io::stdin;
+use std::io::{BufRead, Read, stdin};
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 use std::thread;
 
+use tandem_gcode::MAX_LINE_BYTES;
 use tandem_session::NextLine;
 
 use super::editor::LineEditor;
@@ -94,10 +95,21 @@ fn reader(typed: bool) -> Reader {
     Reader { ask, read }
 }
 
-/// The next line of a pipe.
-fn plain_line() -> Option<String> {
-    let mut line = String::new();
-    let read = stdin().read_line(&mut line).is_ok_and(|bytes| bytes > 0);
-    line.truncate(line.trim_end_matches(['\r', '\n']).len());
-    read.then_some(line)
+/// The next line of a pipe; what is too long for a line is cut off behind what shows that. Comments may hold any bytes.
+pub fn plain_line() -> Option<String> {
+    let room = MAX_LINE_BYTES as u64 + 2;
+    let mut input = stdin().lock();
+    let mut line = vec![];
+    let read = |line: &mut Vec<u8>, input: &mut dyn BufRead| {
+        let bytes = input.take(room).read_until(b'\n', line);
+        bytes.is_ok_and(|bytes| bytes > 0)
+    };
+    let is_there = read(&mut line, &mut input);
+    let mut rest = line.clone();
+    while rest.len() as u64 == room && !rest.ends_with(b"\n") {
+        rest.clear();
+        read(&mut rest, &mut input);
+    }
+    let line = String::from_utf8_lossy(&line);
+    is_there.then(|| line.trim_end_matches(['\r', '\n']).to_string())
 }

@@ -12,6 +12,14 @@ pub struct Enter {
 }
 
 impl Enter {
+    /// None comes: standard input is for something else.
+    pub fn never() -> Self {
+        Self {
+            asked: None,
+            over: true,
+        }
+    }
+
     /// Whether a line has come; `Some(false)` where none will.
     pub fn look(&mut self) -> Option<bool> {
         if self.over {

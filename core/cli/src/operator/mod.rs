@@ -105,6 +105,12 @@ impl Operator {
         })
     }
 
+    /// Standard input carries the program: nobody presses Enter there.
+    pub fn without_enter(mut self) -> Self {
+        self.enter = Enter::never();
+        self
+    }
+
     /// The hub, for keys that come and go.
     pub fn hub(&self) -> &Arc<OperatorHub> {
         &self.hub
@@ -209,6 +215,7 @@ pub fn tell(words: &str) {
 
 /// Opens the sockets, and says where clients find them.
 fn serve(options: &args::Operator, hub: &Arc<OperatorHub>) -> Result<Option<Server>, String> {
+    options.check_tokens(false)?;
     if options.is_nowhere() {
         return Ok(None);
     }
@@ -216,6 +223,7 @@ fn serve(options: &args::Operator, hub: &Arc<OperatorHub>) -> Result<Option<Serv
         unix: options.listen.clone(),
         tcp: options.listen_tcp,
         token_file: options.token_file.clone(),
+        role_token_files: options.role_token_files(),
         ..Listen::default()
     };
     let server = Server::start(Arc::clone(hub), &listen)?;

@@ -107,7 +107,7 @@ fn filled(text: &str, name: &str, kind: Kind, source: &Source) -> String {
             "feed strategy",
             "feed_strategy",
             "NAME",
-            "most_current_a = 6",
+            "max_current_a = 6",
         ),
         Kind::Driver => ("driver", "driver", "NAME", "# this one has none"),
         Kind::Kinematics => ("kinematics", "kinematics", "core-xy", JOINTS),

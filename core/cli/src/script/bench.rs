@@ -5,8 +5,8 @@ use std::io::Write;
 use std::path::Path;
 use std::time::Instant;
 
-use tandem_policy::{Bounds, Budget, Engine, Facts, Policy};
-use tandem_sdk::{Axes, Block};
+use tandem_policy::{Bounds, Budget, Engine, Facts, Instance, Policy};
+use tandem_sdk::Block;
 
 use super::sample;
 
@@ -18,12 +18,9 @@ pub fn bench(path: &Path, calls: usize) -> Result<u8, Box<dyn Error>> {
     let (script, compile_us) = timed(|| engine.compile(&bytes));
     let script = script.map_err(|e| format!("{}: {e}", path.display()))?;
     let (_, cached_us) = timed(|| engine.compile(&bytes));
-    let axes = Axes::new(&[('X', false), ('Y', false), ('Z', false)])?;
     let facts = Facts {
-        axes,
-        time_constant_s: 0.05,
-        path_tolerance_mm: 0.01,
-        rough_period_s: 0.008,
+        signals: sample::signals(&Instance::new(&script, &Budget::default(), &[])?),
+        ..Facts::default()
     };
     let (policy, start_us) = timed(|| {
         Policy::new(
@@ -46,14 +43,14 @@ pub fn bench(path: &Path, calls: usize) -> Result<u8, Box<dyn Error>> {
             &mut out,
             "a window of 1 block",
             &mut one,
-            policy.counters().most_window_fuel,
+            policy.counters().max_window_fuel,
         )?;
         let mut full = histogram(calls, |_| decide(&mut policy, &window));
         print(
             &mut out,
             "a window of 64 blocks",
             &mut full,
-            policy.counters().most_window_fuel,
+            policy.counters().max_window_fuel,
         )?;
     }
     if script.answers_periods {
@@ -64,7 +61,7 @@ pub fn bench(path: &Path, calls: usize) -> Result<u8, Box<dyn Error>> {
             &mut out,
             "a rough period",
             &mut periods,
-            policy.counters().most_period_fuel,
+            policy.counters().max_period_fuel,
         )?;
     }
     for note in policy

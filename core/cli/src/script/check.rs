@@ -4,11 +4,12 @@ use std::error::Error;
 use std::io::Write;
 use std::path::Path;
 
-use tandem_host::PolicySetup;
+use tandem_host::{PolicySetup, strategy_signals};
 use tandem_machine::Machine;
-use tandem_policy::{Engine, Instance, Policy};
+use tandem_policy::{Engine, InputKind, Instance, Policy};
 
 use super::sample;
+use crate::built_in::registry;
 
 /// Prints what a script is, and what it does to a sample, with the parameters and limits of `machine` where one is given.
 pub fn check(
@@ -16,11 +17,13 @@ pub fn check(
     machine: Option<&Path>,
     overrides: &[(String, String)],
 ) -> Result<u8, Box<dyn Error>> {
-    let setup = match machine {
+    let mut setup = match machine {
         Some(file) => {
             let script = ("policy.script".to_string(), path.display().to_string());
             let overrides: Vec<_> = overrides.iter().cloned().chain([script]).collect();
-            PolicySetup::of(&Machine::read(file, &overrides)?)?
+            let machine = Machine::read(file, &overrides)?;
+            let signals = strategy_signals(&machine, &registry()?)?;
+            PolicySetup::of(&machine, signals)?
         }
         None => PolicySetup::default(),
     };
@@ -28,13 +31,20 @@ pub fn check(
     let bytes = std::fs::read(path).map_err(|e| named(&e))?;
     let script = Engine::new()?.compile(&bytes).map_err(|e| named(&e))?;
     let instance = Instance::new(&script, &setup.budget, &setup.values).map_err(|e| named(&e))?;
+    if machine.is_none() {
+        setup.facts.signals = sample::signals(&instance);
+    }
     let mut policy = Policy::new(
         script.clone(),
         setup.values,
         setup.budget,
         setup.bounds,
         &setup.facts,
-    )?;
+    )
+    .map_err(|e| named(&e))?;
+    for which in 0..policy.program_inputs().len() {
+        policy.state(which, 0.0);
+    }
     for block in &sample::window() {
         policy.offer(block, None);
     }
@@ -58,7 +68,7 @@ pub fn check(
         "{}: {} bytes, ABI version {}",
         path.display(),
         bytes.len(),
-        tandem_policy::abi::VERSION
+        script.version
     )?;
     writeln!(out, "calls       {}", calls.join(", "))?;
     writeln!(
@@ -68,6 +78,7 @@ pub fn check(
         setup.budget.memory_pages
     )?;
     parameters(&mut out, &instance)?;
+    inputs(&mut out, &instance)?;
     dry_run(&mut out, &policy, &ratios)?;
     let failed = policy.counters().troubles() > 0;
     for note in policy
@@ -101,6 +112,30 @@ fn parameters(out: &mut impl Write, instance: &Instance) -> std::io::Result<()> 
     Ok(())
 }
 
+/// What it looks at by name.
+fn inputs(out: &mut impl Write, instance: &Instance) -> std::io::Result<()> {
+    for (index, input) in instance.inputs().iter().enumerate() {
+        let kind = match input.kind {
+            InputKind::Program => "of the program",
+            InputKind::Signal => "signal",
+            InputKind::Axis => "axis",
+        };
+        let words = if input.words.is_empty() {
+            String::new()
+        } else {
+            format!(": a number, or {}", input.words.join(", "))
+        };
+        let optional = if input.is_optional { ", if there" } else { "" };
+        writeln!(
+            out,
+            "{:<11} {kind} {}{optional}{words}",
+            if index == 0 { "sees" } else { "" },
+            input.name
+        )?;
+    }
+    Ok(())
+}
+
 fn dry_run(out: &mut impl Write, policy: &Policy, ratios: &[f64]) -> std::io::Result<()> {
     let counters = policy.counters();
     let (tuned, limited) = (
@@ -110,7 +145,7 @@ fn dry_run(out: &mut impl Write, policy: &Policy, ratios: &[f64]) -> std::io::Re
     writeln!(
         out,
         "dry run     64 blocks: {} time constants, {} tolerances, {} feeds; {limited} requests limited; {} fuel",
-        counters.time_constants, counters.tolerances, counters.feed_caps, counters.most_window_fuel
+        counters.time_constants, counters.tolerances, counters.feed_caps, counters.max_window_fuel
     )?;
     if let (Some(least), Some(most)) = (
         ratios.iter().copied().reduce(f64::min),
@@ -119,7 +154,7 @@ fn dry_run(out: &mut impl Write, policy: &Policy, ratios: &[f64]) -> std::io::Re
         writeln!(
             out,
             "            125 rough periods: feed ratio {least:.3} to {most:.3}; {} fuel",
-            counters.most_period_fuel
+            counters.max_period_fuel
         )?;
     }
     if tuned == 0 && ratios.is_empty() && counters.troubles() == 0 {

@@ -1,6 +1,6 @@
 //! Blocks and periods on which scripts are tried.
 
-use tandem_policy::Period;
+use tandem_policy::{InputKind, Instance, MAX_SCRIPT_SIGNALS, Period};
 use tandem_sdk::{ArcGeometry, AxisVector, Block, BlockKind};
 
 /// A window of 64 blocks: a rapid, a zigzag of lines with turns of every size, arcs between them.
@@ -27,6 +27,7 @@ fn block(index: u64, start: AxisVector) -> Block {
         index,
         line: index as u32 + 1,
         end,
+        offset: AxisVector::from_slice(&[10.0, 20.0, 30.0]),
         length_mm,
         feed_mm_per_s: if index == 0 { f64::INFINITY } else { 40.0 },
         tool: 1 + index as u32 / 32,
@@ -75,6 +76,21 @@ pub fn period(index: u64) -> Period {
         spindle_rad_per_s: 500.0,
         distance_left_mm: 1000.0,
         current_a: AxisVector([load; 8]),
+        position: AxisVector([index as f64; 8]),
+        speed: AxisVector([20.0; 8]),
+        axis_error: AxisVector([0.01 * load; 8]),
+        max_axis_error: AxisVector([0.02 * load; 8]),
+        signals: [50.0 * load; MAX_SCRIPT_SIGNALS],
+        sigma: 1.0,
         ..Period::default()
     }
+}
+
+/// The signals that a script asks for, as though the machine had all of them.
+pub fn signals(instance: &Instance) -> Vec<String> {
+    let inputs = instance.inputs().iter();
+    inputs
+        .filter(|input| input.kind == InputKind::Signal)
+        .map(|input| input.name.clone())
+        .collect()
 }

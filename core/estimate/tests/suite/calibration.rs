@@ -1,10 +1,15 @@
 //! Calibration on the planners of this workspace, on made-up controls, and on the published measurements.
 
+use std::fmt::Write as _;
+
 use tandem_estimate::diagnose::{Evidence, Fitted, MIN_R2, fit_all, linear};
 use tandem_estimate::experiment::Experiment;
-use tandem_estimate::polygon::{Polygon, Timed};
+use tandem_estimate::measurements::parse_log;
+use tandem_estimate::polygon::{CORNERS, Polygon, SIDES_MM, Timed};
 use tandem_estimate::{Choice, Rule};
 use tandem_host::Clock;
+use tandem_rig::Random;
+use tandem_sdk::MAX_AXES;
 
 use crate::common::{assert_near, case, number};
 use crate::tie::{LOOK_AHEAD, OVERLAP, TANGENT, mill, registry};
@@ -117,5 +122,103 @@ fn the_experiment_finds_what_kind_of_control_it_is() {
         .unwrap();
         println!("{regression:?}");
         assert_eq!(regression.short.r2 >= MIN_R2, constant_time);
+    }
+}
+
+#[test]
+fn a_control_whose_axes_are_unequal_is_found_from_noisy_readings() {
+    let mut random = Random::from_the_clock();
+    for _ in 0..2 {
+        let noise = random.between(0.005, 0.02);
+        let (slow, fast) = (random.between(150.0, 500.0), random.between(700.0, 2000.0));
+        let [x, y] = random.pick(&[[slow, fast], [fast, slow]]);
+        let mut acceleration_mm_per_s2 = [slow; MAX_AXES];
+        (acceleration_mm_per_s2[0], acceleration_mm_per_s2[1]) = (x, y);
+        let rule = Rule::Axis {
+            acceleration_mm_per_s2,
+            speed_difference_mm_per_s: [random.between(0.5, 4.0); MAX_AXES],
+        };
+        let control = Choice::LookAhead(rule, None);
+        let time_s = |choice: &Choice, corners: u32, side_mm: f64| {
+            let timed = Timed {
+                polygon: Polygon {
+                    corners,
+                    side_mm,
+                    rounds: 2000 / corners,
+                },
+                feed_mm_per_s: 5000.0 / 60.0,
+                time_s: 1.0,
+            };
+            let time_s = timed.under(choice.model().unwrap().as_mut());
+            Timed { time_s, ..timed }
+        };
+        let timed: Vec<Timed> = CORNERS
+            .iter()
+            .flat_map(|corners| SIDES_MM.map(|side_mm| (*corners, side_mm)))
+            .map(|(corners, side_mm)| {
+                let exact = time_s(&control, corners, side_mm);
+                Timed {
+                    time_s: exact.time_s * (1.0 + noise * random.between(-1.0, 1.0)),
+                    ..exact
+                }
+            })
+            .collect();
+        let fitted = best(&timed);
+        assert!(fitted.is_good(), "{x} and {y}, {noise}: {fitted:?}");
+        // Polygons that were not timed.
+        for (corners, side_mm) in [(7, 0.3), (10, 3.0), (48, 0.7), (100, 1.5)] {
+            let (real, estimate) = (
+                time_s(&control, corners, side_mm).time_s,
+                time_s(&fitted.choice, corners, side_mm).time_s,
+            );
+            assert_near(
+                estimate,
+                real,
+                0.01 * real,
+                &format!("{x} and {y}, {corners} x {side_mm}"),
+            );
+        }
+    }
+}
+
+#[test]
+fn a_log_of_lines_gives_the_times_of_the_polygons_without_what_lies_between_them() {
+    let experiment = Experiment::new(&mill(&[]), 20).unwrap();
+    let (mut t_s, mut log) = (3.0, "t_s,line,state\n# a log\n".to_string());
+    let mut sides = 0_usize;
+    for (line, text) in experiment.program(true).lines().enumerate() {
+        // A string takes whatever is written to it.
+        let _ = writeln!(log, "{t_s},{},running", line + 1);
+        // Rapids, dwells and operators take long.
+        t_s += if text.starts_with("G1") {
+            sides += 1;
+            0.01
+        } else {
+            7.0
+        };
+    }
+    let rows = parse_log("log.csv", log.as_bytes()).unwrap();
+    let timed = experiment.timed(&rows).unwrap();
+    assert_eq!(timed.len(), experiment.polygons.len());
+    let blocks: u32 = timed.iter().map(|timed| timed.polygon.blocks()).sum();
+    assert_eq!(blocks as usize, sides);
+    for timed in &timed {
+        let expected = 0.01 * f64::from(timed.polygon.blocks());
+        let what = format!("{:?}", timed.polygon);
+        assert_near(timed.time_s, expected, 1e-6, &what);
+    }
+    let half = &rows[..rows.len() / 2];
+    let refused = experiment.timed(half).unwrap_err();
+    assert!(refused.contains("polygons are in the log"), "{refused}");
+    for (text, words) in [
+        (
+            "t_s,line\n1,5\n0.5,6\n",
+            "log.csv:3: t_s: 0.5 comes after 1",
+        ),
+        ("t_s,line\n1,5\n2,4\n", "log.csv:3: line: 4 comes after 5"),
+        ("t_s,line\n1,five\n", "log.csv:2: line: "),
+    ] {
+        let refused = parse_log("log.csv", text.as_bytes()).unwrap_err();
+        assert!(refused.contains(words), "{refused}");
     }
 }

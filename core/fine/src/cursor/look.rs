@@ -4,11 +4,11 @@ use tandem_rings::Queued;
 use tandem_sdk::{Edge, Segment, SegmentFlags, StopOn};
 
 use super::{Cursor, ends};
-use crate::course::{Course, Place};
-use crate::outlook::{Outlook, derivatives};
-use crate::points::Points;
+use crate::horizon::{Horizon, derivatives};
+use crate::period_points::PeriodPoints;
+use crate::plan_ahead::{PlanAhead, PlanCursor};
 
-/// Most entries that a course reaches over.
+/// Most entries that the plan ahead reaches over.
 const ON_COURSE: usize = 512;
 
 impl Cursor {
@@ -20,7 +20,7 @@ impl Cursor {
     /// Line of the next segment queued.
     pub fn next_line(&mut self) -> Option<u32> {
         let mut line = None;
-        self.walk(self.taken, Points::SEGMENTS, |queued| {
+        self.walk(self.taken, PeriodPoints::SEGMENTS, |queued| {
             if let Queued::Segment { segment, .. } = queued {
                 line = Some(segment.line);
             }
@@ -32,7 +32,7 @@ impl Cursor {
     /// What the motion that begins next at a rest waits for.
     pub fn next_stop_on(&mut self) -> StopOn {
         let (mut awaited, epoch) = (StopOn::default(), self.epoch);
-        self.walk(self.taken, Points::SEGMENTS, |queued| match queued {
+        self.walk(self.taken, PeriodPoints::SEGMENTS, |queued| match queued {
             Queued::Segment { segment, .. } if segment.epoch >= epoch => {
                 awaited = segment.stop_on;
                 false
@@ -78,7 +78,7 @@ impl Cursor {
         if !self.resting && (!look(&self.segment, self.local_s) || ends(&self.segment)) {
             return;
         }
-        self.walk(self.taken, Points::SEGMENTS, |queued| match queued {
+        self.walk(self.taken, PeriodPoints::SEGMENTS, |queued| match queued {
             Queued::Segment { segment, .. } => look(segment, 0.0) && !ends(segment),
             Queued::Event(_) => true,
         });
@@ -94,16 +94,16 @@ impl Cursor {
     }
 
     /// Collects the points of the coming period, and a grid beyond it.
-    pub fn look_out(&mut self, period_s: f64, outlook: &mut Outlook) {
-        outlook.clear();
-        let step_s = outlook.horizon_s / Outlook::GRID as f64;
+    pub fn fill_horizon(&mut self, period_s: f64, horizon: &mut Horizon) {
+        horizon.clear();
+        let step_s = horizon.reach_s / Horizon::GRID as f64;
         let mut grid_s = period_s + step_s;
         let mut start_s = 0.0;
         if !self.resting {
             let here_s = self.segment.duration_s - self.local_s;
-            outlook.stretch(&self.segment, self.local_s, here_s.min(period_s), 0.0);
-            while grid_s <= here_s && grid_s <= outlook.horizon_s {
-                outlook.point(&self.segment, self.local_s + grid_s, grid_s);
+            horizon.stretch(&self.segment, self.local_s, here_s.min(period_s), 0.0);
+            while grid_s <= here_s && grid_s <= horizon.reach_s {
+                horizon.point(&self.segment, self.local_s + grid_s, grid_s);
                 grid_s += step_s;
             }
             if ends(&self.segment) {
@@ -112,32 +112,36 @@ impl Cursor {
             start_s = here_s;
         }
         let next = self.taken;
-        self.walk(next, Points::SEGMENTS, |queued| {
+        self.walk(next, PeriodPoints::SEGMENTS, |queued| {
             let Queued::Segment { segment, .. } = queued else {
                 return true;
             };
             if start_s < period_s {
-                if outlook.is_full() {
+                if horizon.is_full() {
                     return false;
                 }
-                outlook.stretch(
+                horizon.stretch(
                     segment,
                     0.0,
                     segment.duration_s.min(period_s - start_s),
                     start_s,
                 );
             }
-            while grid_s <= start_s + segment.duration_s && grid_s <= outlook.horizon_s {
-                outlook.point(segment, grid_s - start_s, grid_s);
+            while grid_s <= start_s + segment.duration_s && grid_s <= horizon.reach_s {
+                horizon.point(segment, grid_s - start_s, grid_s);
                 grid_s += step_s;
             }
             start_s += segment.duration_s;
-            grid_s <= outlook.horizon_s && !ends(segment)
+            grid_s <= horizon.reach_s && !ends(segment)
         });
     }
 
     /// Shows the plan from here on to `look`, as far as it is queued.
-    pub fn on_course<T>(&mut self, axes: (usize, u32), look: impl FnOnce(Place<'_>) -> T) -> T {
+    pub fn on_plan_ahead<T>(
+        &mut self,
+        axes: (usize, u32),
+        look: impl FnOnce(PlanCursor<'_>) -> T,
+    ) -> T {
         let wanted = self.entries.slots().min(ON_COURSE);
         let local_s = if self.resting {
             self.segment.duration_s
@@ -147,9 +151,9 @@ impl Cursor {
         match self.entries.read_chunk(wanted) {
             Ok(chunk) => {
                 let (first, second) = chunk.as_slices();
-                look(Course::new(&self.segment, [first, second], axes).begin(local_s))
+                look(PlanAhead::new(&self.segment, [first, second], axes).begin(local_s))
             }
-            Err(_) => look(Course::new(&self.segment, [&[], &[]], axes).begin(local_s)),
+            Err(_) => look(PlanAhead::new(&self.segment, [&[], &[]], axes).begin(local_s)),
         }
     }
 }

@@ -105,7 +105,7 @@ impl FineLoop {
         self.attach.joints
     }
 
-    /// Behind an exchange: which joints hold, and where those stand that do not.
+    /// After an exchange: which joints hold, and where those stand that do not.
     pub(super) fn watch_attach(&mut self) {
         if self.attach.is_done() || self.fault.is_some() || self.is_letting_go() {
             return;
@@ -150,8 +150,8 @@ impl FineLoop {
 
     /// The operator aborts before the joints hold: they are not told to any more, and nothing follows.
     pub(super) fn give_up_enabling(&mut self) -> Input {
-        let input = self.part(Stop::abort());
-        let reported = matches!(self.phase, Phase::Parted);
+        let input = self.end_epoch(Stop::abort());
+        let reported = matches!(self.phase, Phase::AwaitingReplan);
         (self.outputs.ended, self.release.had_ended) = (reported, reported);
         if reported {
             self.release.begin();
@@ -173,7 +173,7 @@ impl FineLoop {
             self.stand_at(&joints);
         }
         if self.fault.is_none() && self.config.plans_from_rest {
-            self.part(Stop::attached());
+            self.end_epoch(Stop::attached());
             // Ticks are counted from the first motion on.
             self.phase = Phase::Waiting;
         }

@@ -12,7 +12,7 @@ use crate::fault::FaultKind;
 use crate::state::Input;
 
 impl FineLoop {
-    /// Gives whether all joints hold behind it.
+    /// Exchanges setpoints and feedback with the drives. Returns whether all joints hold afterwards.
     pub(super) fn exchange(&mut self, axes: &AxisVector) -> bool {
         self.set_joints(axes);
         self.setpoint.tick = if self.beats_on {
@@ -51,7 +51,7 @@ impl FineLoop {
         // From the first motion on the drives hold, at rest too: what let go has moved.
         let moving = matches!(
             self.phase,
-            Phase::Following | Phase::Parted | Phase::HandedOver(_)
+            Phase::Following | Phase::AwaitingReplan | Phase::HandedOver(_)
         );
         let own = self.handed_over();
         let fault = failed.then_some(FaultKind::Driver).or(unreadable);
@@ -107,11 +107,16 @@ impl FineLoop {
             sent.push(&self.setpoint.position);
         }
         self.measured.push(&self.feedback.position);
-        let is_old = self.feedback.age_periods[..self.joints]
-            .iter()
-            .fold(0, |any, age| any | age)
-            > 0;
-        self.counters.old_feedback_periods += u64::from(is_old);
+        let ages = self.feedback.age_periods[..self.joints].iter();
+        let age_periods = ages.fold(0, |oldest: u32, age| oldest.max(*age));
+        self.counters.old_feedback_periods += u64::from(age_periods > 0);
+        let bus = &self.status.bus;
+        bus.age_periods.store(age_periods, Relaxed);
+        if age_periods > 0 {
+            bus.old_periods.fetch_add(1, Relaxed);
+        }
+        bus.has_phase.store(self.feedback.has_phase != 0, Relaxed);
+        bus.phase_ns.store(self.feedback.phase_ns, Relaxed);
     }
 
     /// Whether the exchange failed; the driver's first words about it are kept for the host.
@@ -150,6 +155,7 @@ impl FineLoop {
             (self.config.axes_alone(command), self.axes_of(&reported))
         };
         let (switched, phase_ns) = (self.switched(), self.phase_ns());
+        let (ratio, feed_override) = (self.ratios_in_force().feed, self.permitted_override());
         let sample = || Sample {
             tick: self.tick,
             block: self.cursor.segment().block,
@@ -160,9 +166,11 @@ impl FineLoop {
             speed: self.feedback.speed,
             current_a: self.feedback.current_a,
             feed_mm_per_s,
+            end_feed_mm_per_s: self.governor.sigma() * self.cursor.path_speed_mm_per_s(),
             programmed_feed_mm_per_s: self.cursor.segment().feed_mm_per_s,
             sigma: self.governor.sigma(),
-            ratio: self.ratio * self.given.feed_override,
+            ratio,
+            feed_override,
             spindle_rad_per_s: self.feedback.spindle_rad_per_s,
             switched,
             phase_ns,
@@ -215,9 +223,13 @@ impl FineLoop {
         let status = &self.status;
         status.tick.store(self.tick, Relaxed);
         status.program_time_s.store(self.cursor.program_time_s());
-        status
-            .feed_mm_per_s
-            .store(self.governor.sigma() * self.cursor.path_speed_mm_per_s());
+        // Off the plan nothing is fed, as in the samples: σ keeps what it was when the fault came.
+        let feed_mm_per_s = if self.fault.is_some() {
+            0.0
+        } else {
+            self.governor.sigma() * self.cursor.path_speed_mm_per_s()
+        };
+        status.feed_mm_per_s.store(feed_mm_per_s);
         status.line.store(self.cursor.segment().line, Relaxed);
         status.state.store(self.state as u32, Relaxed);
         status.inputs.store(self.feedback.inputs, Relaxed);
@@ -242,21 +254,6 @@ impl FineLoop {
         status
             .idle
             .store(self.cursor.is_resting() && self.cursor.is_last(), Relaxed);
-        self.report_counts();
-    }
-
-    fn report_counts(&self) {
-        let (counts, counted) = (&self.status.counts, &self.counters);
-        counts.samples.store(counted.samples, Relaxed);
-        counts.guard_stops.store(counted.guard_stops, Relaxed);
-        counts
-            .limit_violations
-            .store(counted.limit_violations, Relaxed);
-        counts
-            .governed_samples
-            .store(counted.governed_samples, Relaxed);
-        counts.starvations.store(counted.starvations, Relaxed);
-        counts.late_ratios.store(counted.late_ratios, Relaxed);
-        counts.missed_periods.store(counted.missed_periods, Relaxed);
+        status.counts.store(&self.counters);
     }
 }

@@ -1,8 +1,8 @@
 //! Following the plan: what is asked of the rate of program time, and the sample that results.
 
-use std::sync::atomic::Ordering::{Acquire, Relaxed};
+use std::sync::atomic::Ordering::Relaxed;
 
-use tandem_rings::{Queued, STOP_JERK_SHARE, STOP_SHARE};
+use tandem_rings::Queued;
 use tandem_sdk::{AxisVector, EventKind};
 
 use super::spindle::SpinUp;
@@ -27,7 +27,7 @@ pub(super) enum Ask {
 impl FineLoop {
     /// Follows the plan for one period.
     pub(super) fn follow(&mut self) -> (AxisVector, Input) {
-        self.take_ratio();
+        self.counters.late_ratios += self.ratio.take(self.tick);
         self.look_for_stop();
         self.stop_between_lines();
         let ask = self.ask();
@@ -37,7 +37,7 @@ impl FineLoop {
         self.cause = self.cause_of(ask);
         if self.cursor.is_resting() {
             self.governor.jump(if ask == Ask::Run {
-                self.most_rate()
+                self.max_rate()
             } else {
                 0.0
             });
@@ -53,7 +53,7 @@ impl FineLoop {
             .stop
             .filter(|_| self.governor.sigma() == 0.0 || self.cursor.is_resting())
         {
-            return (self.stand(), self.part(stop));
+            return (self.stand(), self.end_epoch(stop));
         }
         if ask == Ask::Run
             && let Some(input) = self.begin_hand_over()
@@ -138,50 +138,24 @@ impl FineLoop {
             self.given.program_hold = true;
             self.outputs.stop_requested = false;
         }
-        self.watch_queue();
+        let starves = self.queue.look(
+            &self.depth,
+            self.cursor.program_time_s(),
+            self.governor.sigma(),
+            self.cursor.path_speed_mm_per_s(),
+            self.config.period_s,
+        );
+        self.counters.starvations += u64::from(starves);
         if self.given.hold || self.given.program_hold || self.controls.soft_fault.load(Relaxed) {
             Ask::Hold
         } else if self.stop.is_some() {
             Ask::Stop
-        } else if self.starved {
+        } else if self.queue.is_starved() {
             Ask::Starve
         } else if self.waits_for_spindle() {
             Ask::Hold
         } else {
             Ask::Run
-        }
-    }
-
-    /// Starvation: the end of the queue is a wall unless it ends at rest, and the machine must be able to stop before.
-    ///
-    /// Where the ring is full and the rough loop looks after it, nothing is late: the wall moves on as entries are driven,
-    /// and the rate that the rough loop has found for what the ring holds counts instead.
-    fn watch_queue(&mut self) {
-        let served = self.depth.served.load(Acquire);
-        self.unserved = if served == self.served {
-            self.unserved + 1
-        } else {
-            0
-        };
-        self.served = served;
-        let wall_s = self.depth.wall_s.load();
-        if self.starved {
-            self.starved = !self.depth.may_start(self.cursor.program_time_s());
-            return;
-        }
-        let speed = self.governor.sigma() * self.cursor.path_speed_mm_per_s();
-        let deceleration = self.depth.stop_deceleration_mm_per_s2.load();
-        // The declared deceleration is kept within the governor's margin and from the next period on.
-        let ramp_s = self.depth.stop_ramp_s.load() / STOP_JERK_SHARE;
-        let stop_s = (speed / deceleration).min(self.governor.sigma() * self.depth.stop_s.load())
-            / STOP_SHARE;
-        let stop_s = stop_s + ramp_s + 3.0 * self.config.period_s;
-        let unserved_s = f64::from(self.unserved) * self.config.period_s;
-        let deep_as_can_be =
-            self.depth.full.load(Acquire) && unserved_s <= self.depth.served_for_s.load();
-        if speed > 0.0 && wall_s - self.cursor.program_time_s() < stop_s && !deep_as_can_be {
-            self.starved = true;
-            self.counters.starvations += 1;
         }
     }
 

@@ -1,18 +1,24 @@
 //! Choosing the rate of program time: what is asked for, and what the limits allow.
 
+use crate::governor::tuning::{
+    ABOVE_FEED_SHARE, BEGINNING_PERIODS, BRAKING_JERK_SHARE, BRAKING_PERIODS, LONGER_MARGIN,
+    MAX_LONGER,
+};
 use tandem_rings::STOP_SHARE;
 
 use super::FineLoop;
 use super::follow::Ask;
-use super::single_block::LINE_END_MM;
 use crate::config::GuardMode;
 use crate::governor::{Aim, Governor};
 use crate::law::Along;
-use crate::preview::Mark;
+use crate::slowdowns::Slowdown;
 
 /// The feed ratios that count now.
 pub(super) struct Ratios {
+    /// At the end of the period.
     pub(super) feed: f64,
+    /// The mean of that over the period: on the way down a period that ends at its ratio is not to end below it.
+    pub(super) mean_feed: f64,
     pub(super) rapid: f64,
 }
 
@@ -27,19 +33,11 @@ struct Asked {
     rapid: bool,
 }
 
-/// Share of the speed asked for by which a period may begin above it and still end as far below, so that its mean is met. The
-/// rounds that seek the rate leave a thousandth where the plan changes by half in a period.
-const ABOVE: f64 = 0.01;
+/// Fine periods for which lower feeds are looked for beyond the longest stop: those in which what was seen is acted on.
+const SLOWDOWN_PERIODS: f64 = 4.0;
 
 /// Share of the path coordinate by which a difference of two of them is rounded.
 const ROUNDED_SHARE: f64 = 2.0 * f64::EPSILON;
-
-/// By which share of the difference the way of the axes is taken to differ more: the rate changes in the period in which it is
-/// looked at.
-const WIDER: f64 = 0.1;
-/// What is longer by more than that is no fit of a polynomial: where a rotary axis hands over to a linear one, the path coordinate
-/// is in other units.
-const MAX_LONGER: f64 = 1.01;
 
 /// Share of the path coordinate that a period is to be long, so that its length is known to a millionth.
 const MIN_SHARE: f64 = 1e6 * f64::EPSILON;
@@ -47,11 +45,8 @@ const MIN_SHARE: f64 = 1e6 * f64::EPSILON;
 /// Rounds in which the rate of the first period from rest is sought: 1/2 of what is wrong is left by each.
 const REST_ROUNDS: u32 = 8;
 
-/// Periods from rest for which the first rate is to last where jerk is limited.
-const BEGINNING: u32 = 6;
-
-/// Share of the jerk that braking for a place ahead counts on.
-const JERK_SHARE: f64 = 0.9;
+/// Halvings in which it is sought where these do not settle.
+const REST_HALVINGS: u32 = 24;
 
 impl FineLoop {
     /// Chooses the rate for this period; gives the program time that passes, s.
@@ -73,9 +68,11 @@ impl FineLoop {
                 return self.covered(self.config.period_s);
             }
             self.cursor
-                .look_out(self.config.period_s, &mut self.outlook);
+                .fill_horizon(self.config.period_s, &mut self.horizon);
         } else if ask == Ask::Run && below {
-            ratios.feed /= self.longer();
+            let longer = self.longer();
+            ratios.feed /= longer;
+            ratios.mean_feed /= longer;
         }
         let end_mm = if ask == Ask::Run {
             self.line_end()
@@ -88,11 +85,11 @@ impl FineLoop {
             0.0
         };
         let delta_s = if self.config.order >= 3 {
-            self.govern_smooth(ask, &ratios, way_speed)
+            self.govern_smooth(ask, &ratios, way_speed, end_mm)
         } else {
             self.govern_steep(ask, &ratios, way_speed)
         };
-        let limited = self.most_rate() < 1.0;
+        let limited = self.max_rate() < 1.0;
         let asked = ask != Ask::Run || below || ratios.rapid < 1.0 || end_mm.is_some() || limited;
         let sigma = self.governor.sigma();
         self.counters.queue_limited_samples += u64::from(limited && ask == Ask::Run && sigma < 1.0);
@@ -107,7 +104,7 @@ impl FineLoop {
     fn longer(&mut self) -> f64 {
         let delta_s = self.governor.sigma() * self.config.period_s;
         let lanes = (self.config.lane_count(), self.config.linear);
-        let longer = self.cursor.on_course(lanes, |place| {
+        let longer = self.cursor.on_plan_ahead(lanes, |place| {
             let mut soon = place;
             soon.go(delta_s);
             let (from, to) = (place.pace()?, soon.pace()?);
@@ -117,14 +114,14 @@ impl FineLoop {
         });
         longer
             .filter(|longer| *longer < MAX_LONGER)
-            .map_or(1.0, |longer| 1.0 + (1.0 + WIDER) * (longer - 1.0))
+            .map_or(1.0, |longer| 1.0 + (1.0 + LONGER_MARGIN) * (longer - 1.0))
     }
 
     /// Whether program time passes at its own rate and nothing asks for another: then nothing needs to be foreseen.
     fn runs_as_planned(&self, ask: Ask, below: bool, ratios: &Ratios) -> bool {
         let constant = self.governor.sigma() == 1.0 && self.governor.rate_per_s() == 0.0;
         let unasked = ask == Ask::Run && !below && ratios.rapid >= 1.0 && !self.given.single_block;
-        constant && unasked && self.most_rate() == 1.0 && self.plan_limit() == 1.0
+        constant && unasked && self.max_rate() == 1.0 && self.plan_limit() == 1.0
     }
 
     /// As much of `delta_s` as lies within what was looked at.
@@ -137,8 +134,8 @@ impl FineLoop {
     }
 
     /// The highest rate that the queue allows.
-    pub(super) fn most_rate(&self) -> f64 {
-        self.depth.most_rate.load()
+    pub(super) fn max_rate(&self) -> f64 {
+        self.depth.max_rate.load()
     }
 
     /// The highest rate at which the plan keeps velocity and acceleration. Jerk beyond the limit at single points need not be
@@ -153,7 +150,7 @@ impl FineLoop {
 
     /// Limits of velocity and acceleration: σ is linear in the period.
     fn govern_steep(&mut self, ask: Ask, ratios: &Ratios, way_speed_mm_per_s: f64) -> f64 {
-        let limit = self.plan_limit().min(self.most_rate());
+        let limit = self.plan_limit().min(self.max_rate());
         self.ask_for_rate(limit);
         if ask == Ask::Run {
             self.look_at_feeds(ratios);
@@ -188,7 +185,7 @@ impl FineLoop {
         } = self;
         governor.look_no_more();
         if ratios.feed < config.max_feed_ratio {
-            cursor.on_course((config.lane_count(), config.linear), |place| {
+            cursor.on_plan_ahead((config.lane_count(), config.linear), |place| {
                 governor.look_ahead(place, ratios.feed);
             });
         }
@@ -207,15 +204,21 @@ impl FineLoop {
     }
 
     /// Limits of jerk too: σ̈ is constant in the period.
-    fn govern_smooth(&mut self, ask: Ask, ratios: &Ratios, way_speed_mm_per_s: f64) -> f64 {
+    fn govern_smooth(
+        &mut self,
+        ask: Ask,
+        ratios: &Ratios,
+        way_speed_mm_per_s: f64,
+        end_mm: Option<f64>,
+    ) -> f64 {
         if ask == Ask::Run && self.cursor.is_resting() {
             self.begin_below(ratios);
         }
         let path = self.cursor.path_derivatives();
         let ahead = self
             .cursor
-            .ahead(self.governor.sigma() * self.config.period_s);
-        let limit = self.plan_limit().min(self.most_rate());
+            .planned_after(self.governor.sigma() * self.config.period_s);
+        let limit = self.plan_limit().min(self.max_rate());
         self.ask_for_rate(limit);
         let run = if ahead.rapid {
             ratios.rapid.min(limit)
@@ -244,6 +247,7 @@ impl FineLoop {
                 speed_mm_per_s: feed.min(way_speed_mm_per_s),
                 ratio,
                 path,
+                rest_at: end_mm.map(|end_mm| self.rest_at(end_mm)),
             },
             // Where the plan stands still, its path says nothing.
             _ => Aim {
@@ -251,14 +255,15 @@ impl FineLoop {
                 speed_mm_per_s: 0.0,
                 ratio,
                 path,
+                rest_at: None,
             },
         };
-        let (governor, outlook) = (&mut self.governor, &self.outlook);
+        let (governor, horizon) = (&mut self.governor, &self.horizon);
         let recent = self.cursor.recent_steps();
         let lanes = (self.config.lane_count(), self.config.linear);
         let chosen = self
             .cursor
-            .on_course(lanes, |place| governor.smooth(&aim, outlook, place, recent));
+            .on_plan_ahead(lanes, |place| governor.smooth(&aim, horizon, place, recent));
         if chosen.relaxed {
             self.guard.relax_jerk();
         }
@@ -283,8 +288,8 @@ impl FineLoop {
     /// The rate that keeps ratio × programmed feed in the coming periods, where `delta_s` of program time passes in each.
     fn rate_below(&mut self, delta_s: f64, ratios: &Ratios) -> f64 {
         let (mut rate, mut from_mm) = (f64::INFINITY, self.cursor.path_mm());
-        for period in 1..=BEGINNING {
-            let ahead = self.cursor.ahead(f64::from(period) * delta_s);
+        for period in 1..=BEGINNING_PERIODS {
+            let ahead = self.cursor.planned_after(f64::from(period) * delta_s);
             let fastest = ahead
                 .speed_mm_per_s
                 .max((ahead.path_mm - from_mm) / delta_s);
@@ -296,22 +301,37 @@ impl FineLoop {
         rate
     }
 
-    fn ratios_in_force(&self) -> Ratios {
-        let operator = |value: f64| {
-            if self.outputs.override_permitted {
-                value
+    /// The operator's feed override, where the program permits it.
+    pub(super) fn permitted_override(&self) -> f64 {
+        if self.outputs.override_permitted {
+            self.given.feed_override
+        } else {
+            1.0
+        }
+    }
+
+    pub(super) fn ratios_in_force(&self) -> Ratios {
+        let operator = self.permitted_override();
+        let [feed, mean_feed] = if self.outputs.adaptive_permitted {
+            // What is above 1 is in the ratio already, within the strategy's own bounds.
+            let operator = if self.config.strategy_takes_override {
+                operator.min(1.0)
             } else {
-                1.0
-            }
+                operator
+            };
+            [self.ratio.now(), self.ratio.mean()].map(|ratio| operator * ratio)
+        } else {
+            [operator; 2]
         };
-        let adaptive = if self.outputs.adaptive_permitted {
-            self.ratio
+        let rapid = if self.outputs.override_permitted {
+            self.given.rapid_override.min(1.0)
         } else {
             1.0
         };
         Ratios {
-            feed: operator(self.given.feed_override) * adaptive,
-            rapid: operator(self.given.rapid_override).min(1.0),
+            feed,
+            mean_feed,
+            rapid,
         }
     }
 
@@ -336,7 +356,7 @@ impl FineLoop {
             );
             let steady = asked.at_end.min(asked.mean);
             // From above, an end that makes the mean right lies as far below: the next period would begin in a dip.
-            let above = speed_mm_per_s > (1.0 + ABOVE) * asked.allowed_mm_per_s;
+            let above = speed_mm_per_s > (1.0 + ABOVE_FEED_SHARE) * asked.allowed_mm_per_s;
             let next = if above {
                 steady
             } else {
@@ -365,7 +385,14 @@ impl FineLoop {
             let asked =
                 self.asked_of_period(sigma * self.config.period_s, ratios, way_speed_mm_per_s);
             let next = asked.at_end.min(asked.mean);
-            if next == sigma || round + 1 == 2 * REST_ROUNDS {
+            if next == sigma {
+                break;
+            }
+            if round + 1 == 2 * REST_ROUNDS {
+                // Where the period goes on to the next rest, a lower rate hardly lowers what is driven in it, and this hardly settles.
+                if sigma > next * (1.0 + FEED_TOLERANCE) {
+                    sigma = self.kept_from_rest(sigma, ratios, way_speed_mm_per_s);
+                }
                 break;
             }
             // Where the period goes on over a corner neither is so, and what is found last must not be too fast.
@@ -380,15 +407,31 @@ impl FineLoop {
         sigma
     }
 
+    /// A rate from rest below `too_high` that is kept over the period, as high as halving finds it; that one where none is.
+    fn kept_from_rest(&mut self, too_high: f64, ratios: &Ratios, way_speed_mm_per_s: f64) -> f64 {
+        let (mut kept, mut high) = (0.0, too_high);
+        for _ in 0..REST_HALVINGS {
+            let sigma = f64::midpoint(kept, high);
+            let asked =
+                self.asked_of_period(sigma * self.config.period_s, ratios, way_speed_mm_per_s);
+            if sigma <= asked.at_end.min(asked.mean) {
+                kept = sigma;
+            } else {
+                high = sigma;
+            }
+        }
+        if kept > 0.0 { kept } else { too_high }
+    }
+
     /// What is asked of a period in which `delta_s` of program time passes.
     fn asked_of_period(&mut self, delta_s: f64, ratios: &Ratios, way_speed_mm_per_s: f64) -> Asked {
         let from_mm = self.cursor.path_mm();
-        let ahead = self.cursor.ahead(delta_s);
+        let ahead = self.cursor.planned_after(delta_s);
         let keeps = ratios.feed >= self.config.max_feed_ratio;
         let allowed_mm_per_s = if keeps {
             f64::INFINITY
         } else {
-            ratios.feed * ahead.most_feed_mm_per_s
+            ratios.mean_feed * ahead.max_feed_mm_per_s
         };
         let of_places = within(way_speed_mm_per_s, ahead.speed_mm_per_s)
             .min(self.governor.rate_in_time(delta_s));
@@ -426,7 +469,7 @@ impl FineLoop {
 
     /// The speed at the end of this period from which every lower feed ahead, and the end of the line, can be met, mm/s.
     fn speed_for_places(&mut self, ratios: &Ratios, end_mm: Option<f64>) -> f64 {
-        let at_end = end_mm.map_or(f64::INFINITY, |end_mm| self.speed_towards(end_mm, 0.0));
+        let at_end = end_mm.map_or(f64::INFINITY, |end_mm| self.speed_to_rest(end_mm));
         if end_mm.is_some() {
             self.ask_for_rate(0.0);
         }
@@ -434,13 +477,13 @@ impl FineLoop {
             return at_end;
         }
         let along = self.along();
-        let stop_s = along.speed_mm_per_s / along.most_mm_per_s2
-            + self.outlook.horizon_s
-            + 4.0 * self.config.period_s;
+        let stop_s = along.speed_mm_per_s / along.max_mm_per_s2
+            + self.horizon.reach_s
+            + SLOWDOWN_PERIODS * self.config.period_s;
         let until_s = self.cursor.program_time_s() + stop_s;
-        self.preview.extend(&mut self.cursor, until_s);
-        let marks = self.preview.marks();
-        let met = |mark: &Mark| mark.speed_to_meet_mm_per_s(ratios.feed, self.config.period_s);
+        self.slowdowns.extend(&mut self.cursor, until_s);
+        let marks = self.slowdowns.marks();
+        let met = |mark: &Slowdown| mark.speed_to_meet_mm_per_s(ratios.feed, self.config.period_s);
         let mut least = (at_end, f64::INFINITY);
         for mark in marks {
             least = (
@@ -459,21 +502,20 @@ impl FineLoop {
     ///
     /// With limits of order 2 the speeds at the ends of the periods to come are laid out ([`Along::speed_towards`]). With a
     /// jerk limit it is decided period by period whether braking may still wait.
-    fn speed_towards(&self, place_mm: f64, end_mm_per_s: f64) -> f64 {
+    pub(super) fn speed_towards(&self, place_mm: f64, end_mm_per_s: f64) -> f64 {
         let (along, period_s) = (self.along(), self.config.period_s);
         let left_mm = place_mm - self.cursor.path_mm();
         if self.config.order < 3 {
             return along.speed_towards(left_mm, end_mm_per_s, period_s);
         }
-        let soon_mm = 2.0
+        let soon_mm = BRAKING_PERIODS
             * period_s
             * (along.speed_mm_per_s + period_s * along.acceleration_mm_per_s2.max(0.0));
         let later = Along {
             speed_mm_per_s: along.speed_mm_per_s.max(end_mm_per_s),
             ..along
         };
-        // So near there is no way to get faster again: the place would be passed.
-        let waits = left_mm > LINE_END_MM && later.way_to_mm(end_mm_per_s) + soon_mm < left_mm;
+        let waits = later.way_to_mm(end_mm_per_s) + soon_mm < left_mm;
         if waits { f64::INFINITY } else { end_mm_per_s }
     }
 
@@ -485,23 +527,8 @@ impl FineLoop {
             speed_mm_per_s: sigma * speed,
             acceleration_mm_per_s2: sigma * sigma * acceleration
                 + speed * self.governor.rate_per_s(),
-            most_mm_per_s2: STOP_SHARE * self.depth.stop_deceleration_mm_per_s2.load(),
-            jerk_mm_per_s3: JERK_SHARE * self.outlook.path_jerk_mm_per_s3,
-        }
-    }
-
-    /// Takes the ratios that are due.
-    pub(super) fn take_ratio(&mut self) {
-        loop {
-            let Some(next) = self.next_ratio.take().or_else(|| self.ratios.pop().ok()) else {
-                return;
-            };
-            if next.tick > self.tick {
-                self.next_ratio = Some(next);
-                return;
-            }
-            self.counters.late_ratios += u64::from(next.tick < self.tick);
-            self.ratio = next.ratio;
+            max_mm_per_s2: STOP_SHARE * self.depth.stop_deceleration_mm_per_s2.load(),
+            jerk_mm_per_s3: BRAKING_JERK_SHARE * self.horizon.path_jerk_mm_per_s3,
         }
     }
 }

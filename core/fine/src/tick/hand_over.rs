@@ -68,7 +68,7 @@ impl FineLoop {
         hand.given_up |= self.given.abort || self.is_jog_let_go();
         if is_new && state == JointState::Enabled && (homed || hand.given_up) {
             self.take_back(hand.joint);
-            return self.part(if hand.given_up {
+            return self.end_epoch(if hand.given_up {
                 Stop::abort()
             } else {
                 Stop::of(RestCause::Corrected)
@@ -105,7 +105,7 @@ impl FineLoop {
     pub(super) fn end_hand_over(&mut self) {
         if let Phase::HandedOver(hand) = &self.phase {
             let joint = hand.joint;
-            self.phase = Phase::Parted;
+            self.phase = Phase::AwaitingReplan;
             self.take_back(joint);
         }
     }

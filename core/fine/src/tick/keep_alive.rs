@@ -21,7 +21,7 @@ impl FineLoop {
             return;
         }
         self.keep_alive.periods = self.keep_alive.periods.saturating_add(1);
-        let most = jog.most_periods.load(Relaxed);
+        let most = jog.max_periods.load(Relaxed);
         if most > 0 && self.keep_alive.periods >= most {
             jog.let_go.store(true, Relaxed);
         }

@@ -16,7 +16,7 @@ const MAX_WINDOW_PERIODS: f64 = 1e6;
 /// where the oldest of them is still in the window, there are too many. So a period that is kept costs nothing.
 #[derive(Debug)]
 pub(super) struct Missed {
-    most_in_a_row: u64,
+    max_in_a_row: u64,
     in_a_row: u64,
     window_periods: u64,
     /// Numbers of the periods that were missed last, a ring; empty where the share allows all of them.
@@ -34,7 +34,7 @@ impl Missed {
         let most = (config.missed.share * window * (1.0 + 4.0 * f64::EPSILON)).floor();
         let remembered = if most < window { most as usize + 1 } else { 0 };
         Self {
-            most_in_a_row: config.missed.in_a_row,
+            max_in_a_row: config.missed.in_a_row,
             in_a_row: 0,
             window_periods: window as u64,
             // Not zero: memory that is written to here is not mapped in a fine period.
@@ -46,8 +46,8 @@ impl Missed {
     /// The periods from `first` on were missed in motion, as part of a row. Bounded by the window.
     fn count(&mut self, first: u64, periods: u64) -> Option<FaultKind> {
         self.in_a_row = self.in_a_row.saturating_add(periods);
-        if self.in_a_row > self.most_in_a_row {
-            let (missed, most) = (self.in_a_row, self.most_in_a_row);
+        if self.in_a_row > self.max_in_a_row {
+            let (missed, most) = (self.in_a_row, self.max_in_a_row);
             return Some(FaultKind::MissedPeriods {
                 missed,
                 most,

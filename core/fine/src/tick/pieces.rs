@@ -111,8 +111,8 @@ fn piece_target(
     if segment.flags.contains(SegmentFlags::RAPID) {
         return ratios.rapid.min(of_places);
     }
-    let allowed = ratios.feed * segment.feed_mm_per_s;
-    let at_end = within(allowed, behind).min(of_places);
+    let at_end = within(ratios.feed * segment.feed_mm_per_s, behind).min(of_places);
+    let allowed = ratios.mean_feed * segment.feed_mm_per_s;
     let way_mm = segment.path_mm(to_s) - segment.path_mm(from_s);
     let is_below = sigma * before <= allowed * (1.0 + FEED_TOLERANCE);
     if is_below && way_mm > 0.0 {

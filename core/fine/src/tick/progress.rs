@@ -1,6 +1,6 @@
 //! Progress of program time: where nothing is asked to stop, it gets on, or the machine faults.
 //!
-//! In any window of [`Progress::most_periods`] fine periods in which nothing asks for a stop, the queue is not starved and
+//! In any window of [`Progress::max_periods`] fine periods in which nothing asks for a stop, the queue is not starved and
 //! something is queued, program time grows by at least one fine period at the least rate that was asked for in the window.
 //! The window is derived from the machine: from rest an axis is at its highest speed V after `V/A + A/J`. At half the rate
 //! the plan itself takes a quarter of the acceleration and an eighth of the jerk at most, so that what is left brings σ up in
@@ -23,7 +23,7 @@ const NO_RATE: f64 = 1e-8;
 /// What has passed since progress was last made.
 #[derive(Debug)]
 pub(super) struct Progress {
-    most_periods: u64,
+    max_periods: u64,
     periods: u64,
     /// Program time when the window began, s.
     from_s: f64,
@@ -48,9 +48,9 @@ impl Progress {
                             + build_up_s,
                     )
                 });
-        let most_periods = (WINDOW * longest_s / config.period_s + FIRST_PERIODS).ceil() as u64;
+        let max_periods = (WINDOW * longest_s / config.period_s + FIRST_PERIODS).ceil() as u64;
         Self {
-            most_periods,
+            max_periods,
             periods: 0,
             from_s: 0.0,
             asked: 1.0,
@@ -70,34 +70,21 @@ impl FineLoop {
 
     /// Whether an override or a ratio is as good as 0: what passes then is in the rounding of a day.
     fn stands_by_ratio(&self) -> bool {
-        let (operator, adaptive) = (
-            self.outputs.override_permitted,
-            self.outputs.adaptive_permitted,
-        );
-        let feed = if operator {
-            self.given.feed_override
-        } else {
-            1.0
-        } * if adaptive { self.ratio } else { 1.0 };
-        let rapid = if operator {
-            self.given.rapid_override
-        } else {
-            1.0
-        };
-        feed.min(rapid) < NO_RATE
+        let ratios = self.ratios_in_force();
+        ratios.feed.min(ratios.rapid) < NO_RATE
     }
 
     fn has_nothing_to_do(&self, reached: Reached) -> bool {
         reached == Reached::Rest && self.cursor.is_last()
     }
 
-    /// Behind a move: program time has got on, or nothing wants it to, or that is a fault.
+    /// After a move: program time has got on, or nothing asks for it, or that is a fault.
     pub(super) fn watch_progress(&mut self, ask: Ask, reached: Reached) {
         let now_s = self.cursor.program_time_s();
         let grown_s = now_s - self.progress.from_s;
-        let least_s = self.progress.asked * self.config.period_s;
+        let min_s = self.progress.asked * self.config.period_s;
         // What is true nearly always is looked at first.
-        if grown_s > least_s
+        if grown_s > min_s
             || ask != Ask::Run
             || self.stands_by_ratio()
             || self.has_nothing_to_do(reached)
@@ -106,7 +93,7 @@ impl FineLoop {
             return;
         }
         self.progress.periods += 1;
-        if self.progress.periods > self.progress.most_periods {
+        if self.progress.periods > self.progress.max_periods {
             self.fail(FaultKind::NoProgress {
                 periods: self.progress.periods,
                 grown_s,

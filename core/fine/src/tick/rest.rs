@@ -1,5 +1,5 @@
-//! Rests that end an epoch: an input edge or an abort stops the machine on the path, and what was queued behind counts no
-//! more.
+//! Rests that end an epoch: an input edge or an abort stops the machine on the path, and what was queued after it no longer
+//! counts.
 //!
 //! # Exact rest
 //!
@@ -48,8 +48,8 @@ impl Stop {
 }
 
 impl FineLoop {
-    /// Before a period: an abort, a jog that is let go, axes that are to be called otherwise, or a motion that ended without
-    /// its edge.
+    /// Before a period: an abort, a jog that is let go, axes whose position is set anew, or a motion that ended without its
+    /// edge.
     pub(super) fn look_for_stop(&mut self) {
         if self.given.abort {
             self.stop = Some(Stop::abort());
@@ -85,7 +85,7 @@ impl FineLoop {
         }
     }
 
-    /// Calls the place where the machine rests otherwise. The drives are sent what they were sent before.
+    /// Sets the position of the axes anew where the machine rests. The drives are sent what they were sent before.
     fn correct(&mut self, by: &AxisVector) {
         self.guard.correct(by);
         self.offset = self.offset - *by;
@@ -103,9 +103,13 @@ impl FineLoop {
         is_new
     }
 
-    /// Behind a move: a motion that waits for an edge may have begun.
+    /// After a move: a motion that waits for an edge may have begun.
     pub(super) fn begin_edge(&mut self) {
-        if self.edge.begin(self.cursor.segment(), &self.feedback) {
+        if self.edge.begin(
+            self.cursor.segment(),
+            &self.feedback,
+            &self.config.home_switches,
+        ) {
             self.stop.get_or_insert(Stop {
                 cause: RestCause::Already,
                 latch: None,
@@ -113,7 +117,7 @@ impl FineLoop {
         }
     }
 
-    /// Behind an exchange: the edge may have come.
+    /// After an exchange: the edge may have come.
     pub(super) fn watch_edge(&mut self) {
         let stop_on = &self.cursor.segment().stop_on;
         if stop_on.edge == Edge::None
@@ -127,6 +131,7 @@ impl FineLoop {
             &self.feedback,
             &self.measured,
             self.config.period_s,
+            &self.config.home_switches,
         ) {
             self.stop = Some(Stop {
                 cause: RestCause::Edge,
@@ -135,8 +140,8 @@ impl FineLoop {
         }
     }
 
-    /// At rest: reports it and ends the epoch. Where nobody has taken the reports before, it waits.
-    pub(super) fn part(&mut self, stop: Stop) -> Input {
+    /// At rest: reports it and ends the epoch. Where the reports before have not been taken yet, it waits for that.
+    pub(super) fn end_epoch(&mut self, stop: Stop) -> Input {
         let latch = stop.latch.map(|joints| self.axes_of(&joints));
         let rest = Rest {
             epoch: self.cursor.epoch(),
@@ -153,12 +158,13 @@ impl FineLoop {
         if self.rests.push(rest).is_err() {
             return Input::Hold;
         }
-        self.cursor.part(self.guard.position());
+        self.cursor.end_epoch(self.guard.position());
         self.edge.end();
         self.arm = Arm::default();
-        self.preview.clear();
+        self.slowdowns.clear();
         self.line_end.forget();
-        (self.stop, self.starved, self.phase) = (None, false, Phase::Parted);
+        self.queue.forget();
+        (self.stop, self.phase) = (None, Phase::AwaitingReplan);
         // A jog that is let go leaves a hold as it is: the next one waits for its end too. An abort that comes while the joints
         // are enabled is still to act.
         if self.given.abort && stop.cause != RestCause::Attached {
@@ -172,7 +178,7 @@ impl FineLoop {
     }
 
     /// Motion starts again when the rough loop has taken the report and enough of the new epoch is queued.
-    pub(super) fn wait_parted(&mut self) -> Input {
+    pub(super) fn await_replan(&mut self) -> Input {
         if self.controls.soft_fault.load(Relaxed) {
             self.fail(FaultKind::Soft);
             return Input::Trip;
@@ -181,7 +187,7 @@ impl FineLoop {
             return Input::Rest;
         }
         if self.given.abort {
-            return self.part(Stop::abort());
+            return self.end_epoch(Stop::abort());
         }
         let enough = self.depth.is_of(self.cursor.epoch())
             && self.depth.may_start(self.cursor.program_time_s());

@@ -75,7 +75,7 @@ impl FineLoop {
             0
         };
         let awaited = if moves {
-            roles.awaited & self.awaited() & tripped.old
+            roles.home_or_probe & self.awaited() & tripped.old
         } else {
             0
         };
@@ -84,7 +84,7 @@ impl FineLoop {
             (roles.emergency_stop, InputFault::EmergencyStop),
             (ready, InputFault::DrivesReady),
             (limits, InputFault::Limit),
-            (awaited, InputFault::Awaited),
+            (awaited, InputFault::NotHeardOf),
         ] {
             let Some((input, old)) = tripped.first(those) else {
                 continue;

@@ -1,14 +1,14 @@
-//! One fine loop behind another: the next job of a process takes over the drives of the last one while they hold, or lets
+//! One fine loop after another: the next job of a process takes over the drives of the last one while they hold, or lets
 //! them be enabled once more.
 
 use std::sync::atomic::Ordering::Relaxed;
 
-use tandem_rings::MachineState;
+use tandem_rings::{Counters, MachineState};
 use tandem_sdk::AxisVector;
 
 use super::attach::Attach;
 use super::rest::Stop;
-use super::{Counters, FineLoop, Left, Phase};
+use super::{FineLoop, Left, Phase};
 
 /// How a job of a resident machine has ended; its loop stays at the drives until the next one takes over.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -56,13 +56,22 @@ impl FineLoop {
         }
         if last.has_ended() && last.attach.is_done() && last.setpoint.enable != 0 {
             (self.state, self.roles) = (last.state, std::mem::take(&mut last.roles));
-            self.guard.place(last.guard.position());
+            if self.kinematics.is_some() == last.kinematics.is_some() {
+                self.guard.place(last.guard.position());
+            } else {
+                // The joints of a gantry were homed each by itself, or are going to be: what is an axis here was none there.
+                self.stand_at(&last.setpoint.position);
+            }
             self.attach = Attach::held(last.setpoint.position);
-            self.part(Stop::attached());
+            self.end_epoch(Stop::attached());
             self.phase = Phase::Waiting;
         } else {
             // Where the joints stand is asked of the drives once more.
-            self.guard.place(last.guard.position());
+            if self.kinematics.is_some() == last.kinematics.is_some() {
+                self.guard.place(last.guard.position());
+            } else {
+                self.stand_at(&last.feedback.position);
+            }
             self.attach = Attach::anew(last.feedback.position, resets);
             self.state = MachineState::Disabled;
         }

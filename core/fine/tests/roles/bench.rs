@@ -133,7 +133,7 @@ impl Bench {
             Role::Door => roles.door = bit,
             Role::FeedHold => roles.feed_hold = bit,
             Role::Limit => roles.limit = bit,
-            Role::Probe => roles.awaited = bit,
+            Role::Probe => roles.home_or_probe = bit,
         }
         roles.normally_closed = if closed { bit } else { 0 };
         roles.max_age_periods[input as usize] = MAX_AGE;

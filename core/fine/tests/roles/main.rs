@@ -340,7 +340,7 @@ fn a_switch_that_motion_waits_for_and_does_not_hear_of_is_a_fault() {
         |mut bench, doing, old, _| match (doing, old) {
             (Doing::Probing, true) => {
                 bench.assert_ends_by(FaultKind::Input {
-                    role: InputFault::Awaited,
+                    role: InputFault::NotHeardOf,
                     input: PROBE,
                     old: true,
                 });

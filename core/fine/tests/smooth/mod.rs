@@ -4,7 +4,7 @@ use std::sync::atomic::Ordering::Relaxed;
 
 use tandem_fine::{FineConfig, FineLoop};
 use tandem_rig::Echo;
-use tandem_rings::{HostEnd, Queued, RoughEnd, Sizes, bridge};
+use tandem_rings::{HostEnd, Queued, Ratio, RoughEnd, Sizes, bridge};
 use tandem_sdk::{AxisLimits, AxisVector, Limits, Segment, SegmentFlags};
 
 pub const PERIOD_S: f64 = 1e-3;
@@ -172,6 +172,13 @@ impl Machine {
 
     /// The plan is made at `max_feed_ratio` times the programmed feed.
     pub fn planned_at(plan: &Plan, max_feed_ratio: f64) -> Self {
+        let mut config = Self::config();
+        config.max_feed_ratio = max_feed_ratio;
+        Self::of(plan, &config)
+    }
+
+    /// Two axes with [`LIMITS`].
+    pub fn config() -> FineConfig {
         let axis = AxisLimits {
             min_mm: -1000.0,
             max_mm: 1000.0,
@@ -181,11 +188,13 @@ impl Machine {
             jerk_mm_per_s3: LIMITS.jerk,
             speed_difference_mm_per_s: 0.0,
         };
-        let config = FineConfig {
+        FineConfig {
             order: 3,
-            max_feed_ratio,
             ..FineConfig::new(PERIOD_S, Limits::new(&[axis; 2]).unwrap())
-        };
+        }
+    }
+
+    pub fn of(plan: &Plan, config: &FineConfig) -> Self {
         let (mut rough, end, host) = bridge(Sizes {
             segments: 4096,
             samples: 4096,
@@ -194,7 +203,8 @@ impl Machine {
         let cuts = plan.cuts();
         for &to in &cuts {
             let mut segment = plan.segment(from, to);
-            segment.feed_mm_per_s /= max_feed_ratio;
+            segment.feed_mm_per_s /= config.max_feed_ratio;
+            segment.order = config.order;
             rough
                 .segments
                 .push(Queued::Segment {
@@ -218,7 +228,7 @@ impl Machine {
         rough.depth.stop_deceleration_mm_per_s2.store(500.0);
         rough.depth.wall_s.store(f64::INFINITY);
         rough.depth.required_s.store(0.0);
-        let mut fine = FineLoop::new(&config, end, Box::new(Echo::default()), None);
+        let mut fine = FineLoop::new(config, end, Box::new(Echo::default()), None);
         fine.reset();
         let mut this = Self {
             fine,
@@ -248,6 +258,16 @@ impl Machine {
     /// Feed override.
     pub fn ratio(&self, ratio: f64) {
         self.host.controls.feed_override.store(ratio);
+    }
+
+    /// What strategy and policy ask for from `tick` on.
+    pub fn ask_for(&mut self, tick: u64, ratio: f64) {
+        self.host.ratios.push(Ratio { tick, ratio }).unwrap();
+    }
+
+    /// Position of X in each sample so far, mm.
+    pub fn x_mm(&self) -> Vec<f64> {
+        self.sent.iter().map(|position| position[0]).collect()
     }
 
     pub fn is_at_end(&self) -> bool {

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use super::o_word::{Keyword, OWord, Title};
 use super::{Execution, Step};
 use crate::diagnostic::Diagnostic;
-use crate::fault::{Fault, Span};
 use crate::interpreter::Interpreter;
 use crate::item::Item;
+use crate::line_error::{LineError, Span};
 use crate::program::lines::Pass;
 use crate::program::{Program, ProgramError};
 
@@ -45,7 +45,7 @@ pub(crate) fn call(
             Item::Event(event) => event.line = number,
             Item::Wait(wait) => wait.line = number,
             Item::Command(command) => command.line = number,
-            Item::End => {}
+            Item::Stated { .. } | Item::End => {}
         }
     }
     done.map_err(|mut diagnostic| {
@@ -102,10 +102,10 @@ fn steps(
                 return Err(diagnostic.into());
             }
         };
-        return Err(execution.fault(refused).into());
+        return Err(execution.error(refused).into());
     }
     let endless = format!("by hand a subroutine executes at most {MAX_LINES} lines");
-    Err(execution.fault(&endless).into())
+    Err(execution.error(&endless).into())
 }
 
 /// Whether a line does nothing but end a subroutine without a value, or nothing at all.
@@ -125,15 +125,15 @@ fn ends(text: &[u8]) -> bool {
 
 impl Execution {
     /// An error of the line that was executed last.
-    fn fault(&self, message: &str) -> Diagnostic {
+    fn error(&self, message: &str) -> Diagnostic {
         let text = self.text();
-        let fault = Fault::new(Span::new(0, text.len()), "o-word", message);
+        let error = LineError::new(Span::new(0, text.len()), "o-word", message);
         let number = self.sources.current().lines.number;
         self.called(Diagnostic::new(
             self.interpreter.file(),
             number,
             text,
-            fault,
+            error,
         ))
     }
 }

@@ -10,9 +10,9 @@ use std::ops::Range;
 
 use crate::config::Config;
 use crate::diagnostic::{Diagnostic, Severity};
-use crate::fault::{Fault, Span};
 use crate::interpreter::Interpreter;
 use crate::item::Item;
+use crate::line_error::{LineError, Span};
 use crate::program::lines::{Lines, Mark, Next, Pass};
 use crate::program::{Program, ProgramError};
 use crate::state::parameters::Value;
@@ -234,8 +234,8 @@ impl Execution {
         if !begun {
             return Step::Line;
         }
-        let fault = o_word::without_keyword(Span::new(0, text.len()));
-        let diagnostic = Diagnostic::new(self.interpreter.file(), number, text, fault);
+        let error = o_word::without_keyword(Span::new(0, text.len()));
+        let diagnostic = Diagnostic::new(self.interpreter.file(), number, text, error);
         Step::Wrong(self.called(diagnostic))
     }
 
@@ -250,7 +250,7 @@ impl Execution {
     ) -> Result<Step, ProgramError> {
         self.keep_text();
         let number = self.sources.current().lines.number;
-        let fault = match jump {
+        let error = match jump {
             Jump::Call { .. } if assumed && self.pass == Pass::First => {
                 let text = self.text.clone();
                 return Ok(self.open(number, &text));
@@ -261,14 +261,14 @@ impl Execution {
                 span,
             } => match self.call_program(program, called, times)? {
                 Ok(()) => return Ok(Step::Line),
-                Err(why) => Fault::new(span, "o-word", why),
+                Err(why) => LineError::new(span, "o-word", why),
             },
             Jump::End => match self.end_program(program, out)? {
                 Ok(()) => return Ok(Step::Line),
-                Err(why) => Fault::new(Span::new(0, self.text().len()), "o-word", why),
+                Err(why) => LineError::new(Span::new(0, self.text().len()), "o-word", why),
             },
         };
-        let diagnostic = Diagnostic::new(self.interpreter.file(), number, self.text(), fault);
+        let diagnostic = Diagnostic::new(self.interpreter.file(), number, self.text(), error);
         Ok(Step::Wrong(self.called(diagnostic)))
     }
 
@@ -364,8 +364,8 @@ impl Execution {
             entry.word.keyword,
             Keyword::Sub | Keyword::Else | Keyword::ElseIf | Keyword::Do
         );
-        if !jumps && let Err(fault) = self.read_values(&entry, text) {
-            let diagnostic = Diagnostic::new(self.interpreter.file(), entry.number, text, fault);
+        if !jumps && let Err(error) = self.read_values(&entry, text) {
+            let diagnostic = Diagnostic::new(self.interpreter.file(), entry.number, text, error);
             self.leave_block(program, &entry)?;
             return Ok(Step::Wrong(self.called(diagnostic)));
         }
@@ -403,7 +403,7 @@ impl Execution {
     }
 
     /// Reads the `[values]` behind the keyword.
-    fn read_values(&mut self, entry: &Entry, text: &[u8]) -> Result<(), Fault> {
+    fn read_values(&mut self, entry: &Entry, text: &[u8]) -> Result<(), LineError> {
         let at = usize::from(entry.word.values_at);
         let (min, max) = entry.word.keyword.values();
         self.interpreter
@@ -411,7 +411,7 @@ impl Execution {
             .bracketed(text, at, max, &mut self.values)?;
         if self.values.len() < min {
             let message = format!("{} needs a value in brackets", entry.word.keyword.name());
-            return Err(Fault::new(Span::new(0, at), "value-missing", message));
+            return Err(LineError::new(Span::new(0, at), "value-missing", message));
         }
         Ok(())
     }
@@ -429,8 +429,8 @@ impl Execution {
         let message = "from here on the program depends on what a probe or an input will answer: \
                        what follows is checked when it is driven";
         let span = Span::new(0, text.len());
-        let fault = Fault::new(span, "branch-open", message);
-        let diagnostic = Diagnostic::new(self.interpreter.file(), number, text, fault);
+        let error = LineError::new(span, "branch-open", message);
+        let diagnostic = Diagnostic::new(self.interpreter.file(), number, text, error);
         Step::Open(Diagnostic {
             severity: Severity::Warning,
             ..self.called(diagnostic)
@@ -458,8 +458,8 @@ impl Execution {
         };
         let line = self.sources.current().lines.text(&range).to_vec();
         self.interpreter.begin_o_word(next.number);
-        if let Err(fault) = self.read_values(&next, &line) {
-            let diagnostic = Diagnostic::new(self.interpreter.file(), next.number, &line, fault);
+        if let Err(error) = self.read_values(&next, &line) {
+            let diagnostic = Diagnostic::new(self.interpreter.file(), next.number, &line, error);
             self.leave_block(program, &next)?;
             return Ok(Step::Wrong(self.called(diagnostic)));
         }
@@ -560,16 +560,16 @@ impl Execution {
                         return Ok(self.open(entry.number, text));
                     }
                     Ok(value) => format!("{}", value.number.round()).into(),
-                    Err(fault) => {
+                    Err(error) => {
                         let diagnostic =
-                            Diagnostic::new(self.interpreter.file(), entry.number, text, fault);
+                            Diagnostic::new(self.interpreter.file(), entry.number, text, error);
                         return Ok(Step::Wrong(self.called(diagnostic)));
                     }
                 }
             }
         };
         let refuse = |this: &Self, why: String| {
-            let fault = Fault::new(
+            let error = LineError::new(
                 Span::new(0, usize::from(entry.word.values_at)),
                 "o-word",
                 why,
@@ -578,7 +578,7 @@ impl Execution {
                 this.interpreter.file(),
                 entry.number,
                 text,
-                fault,
+                error,
             ))
         };
         if self.frames.len() == MAX_CALLS {
@@ -629,12 +629,12 @@ impl Execution {
             } else {
                 format!("{keyword} in a subprogram: what M98 has called ends with M99")
             };
-            let fault = Fault::new(
+            let error = LineError::new(
                 Span::new(0, usize::from(entry.word.values_at)),
                 "o-word",
                 why,
             );
-            let diagnostic = Diagnostic::new(self.interpreter.file(), entry.number, text, fault);
+            let diagnostic = Diagnostic::new(self.interpreter.file(), entry.number, text, error);
             return Ok(Step::Stuck(diagnostic));
         };
         self.interpreter
@@ -708,12 +708,12 @@ impl Execution {
             format!("{whose} after {steps} lines{since} ([program] max_steps): it may never end");
         let number = self.sources.current().lines.number;
         let text = self.text();
-        let fault = Fault::new(Span::new(0, text.len()), "endless", message);
+        let error = LineError::new(Span::new(0, text.len()), "endless", message);
         self.called(Diagnostic::new(
             self.interpreter.file(),
             number,
             text,
-            fault,
+            error,
         ))
     }
 }

@@ -1,6 +1,6 @@
 //! The text of a line with an O-word: `o100 while [#1 LT 5]`.
 
-use crate::fault::{Checked, Fault, Span};
+use crate::line_error::{Checked, LineError, Span};
 use crate::syntax::scan::Scanner;
 
 /// Longest name of a subroutine.
@@ -140,7 +140,7 @@ impl OWord {
             return Err(without_keyword(span));
         };
         if matches!(label, Label::Computed(_)) && *keyword != Keyword::Call {
-            return Err(Fault::new(
+            return Err(LineError::new(
                 scanner.since(at),
                 "o-word",
                 "only a call may have a computed number",
@@ -155,13 +155,13 @@ impl OWord {
 }
 
 /// A label without a keyword.
-pub(crate) fn without_keyword(span: Span) -> Fault {
+pub(crate) fn without_keyword(span: Span) -> LineError {
     let names: Vec<_> = Keyword::ALL.iter().map(|(name, _)| *name).collect();
     let message = format!(
         "what the O-word does is missing here: one of {}",
         names.join(", ")
     );
-    Fault::new(span, "o-word", message)
+    LineError::new(span, "o-word", message)
 }
 
 fn label(scanner: &mut Scanner) -> Checked<Label> {
@@ -206,7 +206,7 @@ fn label(scanner: &mut Scanner) -> Checked<Label> {
                 let message = format!(
                     "the name of a subroutine is 1 to {MAX_NAME} characters between < and >, without /"
                 );
-                return Err(Fault::new(scanner.since(start), "o-word", message));
+                return Err(LineError::new(scanner.since(start), "o-word", message));
             }
             Ok(Label::Fixed(name.into()))
         }
@@ -214,7 +214,7 @@ fn label(scanner: &mut Scanner) -> Checked<Label> {
             skip_value(scanner);
             Ok(Label::Computed(start as u16))
         }
-        _ => Err(Fault::new(
+        _ => Err(LineError::new(
             scanner.here(),
             "o-word",
             "an O-word needs a number or a <name>",

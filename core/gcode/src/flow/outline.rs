@@ -4,12 +4,13 @@ use std::collections::HashMap;
 
 use super::o_word::{self, Keyword, Label, OWord, Title};
 use crate::diagnostic::Diagnostic;
-use crate::fault::{Checked, Fault, Span};
+use crate::line_error::{Checked, LineError, Span};
 use crate::program::lines::{Lines, Mark, Next};
 use crate::program::{Program, ProgramError};
 
 /// Most O-words of a file, so that memory stays bounded.
 const MAX_O_WORDS: usize = 20_000;
+const TOO_MANY: &str = "a file holds at most 20000 O-words";
 
 /// One O-word.
 #[derive(Clone, Debug)]
@@ -38,6 +39,8 @@ pub(crate) struct Outline {
     given_up: Vec<usize>,
     /// What is wrong with the O-words of a line. It counts where the line is executed, and not where it never is.
     wrong: HashMap<u32, Diagnostic>,
+    /// The first line with an O-word that is one too many: nothing behind it has been read.
+    full_from: Option<u32>,
 }
 
 impl Outline {
@@ -69,10 +72,17 @@ impl Outline {
             let Some(at) = o_word::find(text, block_delete) else {
                 continue;
             };
+            if outline.is_full() {
+                let error = LineError::new(Span::new(0, at), "o-word", TOO_MANY);
+                let diagnostic = Diagnostic::new(&program.name, number, text, error);
+                outline.wrong.insert(number, diagnostic);
+                outline.full_from = Some(number);
+                break;
+            }
             let added = match OWord::read(text, at) {
                 Ok(Title::Number(label)) => {
                     outline.programs.push((label, number, lines.mark()));
-                    outline.bound()
+                    Ok(())
                 }
                 Ok(Title::Name) => continue,
                 Ok(Title::Word(word)) => {
@@ -87,29 +97,33 @@ impl Outline {
                     };
                     outline.add(entry, &mut open)
                 }
-                Err(fault) => Err(fault),
+                Err(error) => Err(error),
             };
-            if let Err(fault) = added {
+            if let Err(error) = added {
                 outline
                     .wrong
-                    .insert(number, Diagnostic::new(&program.name, number, text, fault));
+                    .insert(number, Diagnostic::new(&program.name, number, text, error));
             }
         }
         open.append(&mut outline.given_up);
         for opened in open {
-            let fault = outline.fault(opened, "it is opened and never closed");
+            let error = match outline.full_from {
+                Some(_) => LineError::new(Span::new(0, 1), "o-word", TOO_MANY),
+                None => outline.error(opened, "it is opened and never closed"),
+            };
             let number = outline.entries[opened].number;
             outline
                 .wrong
                 .entry(number)
-                .or_insert_with(|| Diagnostic::new(&program.name, number, b"", fault));
+                .or_insert_with(|| Diagnostic::new(&program.name, number, b"", error));
         }
         Ok(outline)
     }
 
     /// What is wrong with the O-word of line `number`.
     pub fn wrong(&self, number: u32) -> Option<&Diagnostic> {
-        self.wrong.get(&number)
+        let beyond = self.full_from.filter(|from| number >= *from);
+        self.wrong.get(&beyond.unwrap_or(number))
     }
 
     /// The O-word of line `number`; none where it is wrong.
@@ -139,12 +153,8 @@ impl Outline {
         }
     }
 
-    fn bound(&self) -> Checked<()> {
-        if self.entries.len() + self.programs.len() > MAX_O_WORDS {
-            let message = format!("a file holds at most {MAX_O_WORDS} O-words");
-            return Err(Fault::new(Span::new(0, 1), "o-word", message));
-        }
-        Ok(())
+    fn is_full(&self) -> bool {
+        self.entries.len() + self.programs.len() + self.wrong.len() >= MAX_O_WORDS
     }
 
     /// Where the subprogram with this number begins that is called in line `from`: behind it, or else before it.
@@ -156,7 +166,6 @@ impl Outline {
 
     /// Adds an entry; `open` are the blocks that are not closed yet.
     fn add(&mut self, entry: Entry, open: &mut Vec<usize>) -> Checked<()> {
-        self.bound()?;
         let index = self.entries.len();
         let keyword = entry.word.keyword;
         let label = entry.word.label.clone();
@@ -199,7 +208,7 @@ impl Outline {
             .copied();
         open.push(index);
         if let Some(outer) = outer {
-            return Err(self.fault(
+            return Err(self.error(
                 index,
                 &format!("a subroutine lies within another, {}", self.placed(outer)),
             ));
@@ -208,7 +217,7 @@ impl Outline {
             return Ok(());
         };
         match self.subs.insert(label.clone(), index) {
-            Some(before) => Err(self.fault(
+            Some(before) => Err(self.error(
                 index,
                 &format!("the subroutine is there already: {}", self.placed(before)),
             )),
@@ -237,12 +246,12 @@ impl Outline {
         // Gives up what lies within the block that this closes, so that one mistake is one message.
         let opener =
             |entry: &Entry| keywords.contains(&entry.word.keyword) && entry.word.label == *label;
-        let fault = match open.last() {
-            Some(other) => self.fault(
+        let error = match open.last() {
+            Some(other) => self.error(
                 index,
                 &format!("it closes nothing here: open is {}", self.placed(*other)),
             ),
-            None => self.fault(index, "it closes nothing: no block is open"),
+            None => self.error(index, "it closes nothing: no block is open"),
         };
         if let Some(place) = open
             .iter()
@@ -250,7 +259,7 @@ impl Outline {
         {
             self.given_up.extend(open.drain(place..));
         }
-        Err(fault)
+        Err(error)
     }
 
     /// Entry `index` closes the block that was opened last.
@@ -273,7 +282,7 @@ impl Outline {
 
     fn branch(&mut self, index: usize, label: &Label, open: &[usize]) -> Checked<()> {
         let Some(opened) = self.top(open, label, &[Keyword::If]) else {
-            return Err(self.fault(index, "it belongs to no if that is open here"));
+            return Err(self.error(index, "it belongs to no if that is open here"));
         };
         self.entries[index].open = opened;
         let before = (opened..index)
@@ -281,7 +290,7 @@ impl Outline {
             .find(|inside| self.entries[*inside].open == opened)
             .unwrap_or(opened);
         if self.entries[before].word.keyword == Keyword::Else {
-            return Err(self.fault(
+            return Err(self.error(
                 index,
                 &format!("nothing but endif may follow else, {}", self.placed(before)),
             ));
@@ -307,7 +316,7 @@ impl Outline {
             .copied();
         let Some(around) = around else {
             let names: Vec<_> = keywords.iter().map(|keyword| keyword.name()).collect();
-            return Err(self.fault(
+            return Err(self.error(
                 index,
                 &format!("it stands in no {} with this label", names.join(" or ")),
             ));
@@ -324,15 +333,15 @@ impl Outline {
             .find(|opened| self.entries[**opened].word.keyword == Keyword::Sub)
             .copied();
         let Some(around) = around else {
-            return Err(self.fault(index, "it stands in no sub"));
+            return Err(self.error(index, "it stands in no sub"));
         };
         self.entries[index].open = around;
         Ok(())
     }
 
-    fn fault(&self, index: usize, why: &str) -> Fault {
+    fn error(&self, index: usize, why: &str) -> LineError {
         let end = usize::from(self.entries[index].word.values_at);
-        Fault::new(
+        LineError::new(
             Span::new(0, end),
             "o-word",
             format!("{}: {why}", self.shown(index)),

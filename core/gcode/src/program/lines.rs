@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use super::{KnownChunk, Program, ProgramError};
 use crate::diagnostic::Diagnostic;
-use crate::fault::{Fault, Span};
 use crate::interpreter::MAX_LINE_BYTES;
+use crate::line_error::{LineError, Span};
 
 const CHUNK: usize = 64 * 1024;
 const BOM: &[u8] = b"\xef\xbb\xbf";
@@ -161,8 +161,8 @@ impl Lines {
         let why = format!(
             "the line is longer than {MAX_LINE_BYTES} bytes: this is hardly a part program"
         );
-        let fault = Fault::new(Span::new(0, 1), "line-long", why);
-        Diagnostic::new(&program.name, self.number, self.text(range), fault)
+        let error = LineError::new(Span::new(0, 1), "line-long", why);
+        Diagnostic::new(&program.name, self.number, self.text(range), error)
     }
 
     /// Goes on with the next chunk; false at the end of the file.
@@ -293,9 +293,9 @@ impl Lines {
             "this is not a part program: it holds the byte 0x{:02x}{hint}",
             chunk[at]
         );
-        let fault = Fault::new(Span::new(at - start, at - start + 1), "binary", why);
+        let error = LineError::new(Span::new(at - start, at - start + 1), "binary", why);
         let text = &chunk[start..start + length.min(MAX_LINE_BYTES).max(at - start)];
-        Err(Diagnostic::new(&program.name, line, text, fault).into())
+        Err(Diagnostic::new(&program.name, line, text, error).into())
     }
 }
 

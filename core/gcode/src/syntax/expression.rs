@@ -5,7 +5,7 @@ use std::cell::Cell;
 use super::function::{self, Operator};
 use super::number;
 use super::scan::Scanner;
-use crate::fault::{Checked, Fault, Span};
+use crate::line_error::{Checked, LineError, Span};
 use crate::state::State;
 use crate::state::letters::Letters;
 use crate::state::parameters::{LAST, Parameters, Value};
@@ -76,7 +76,7 @@ impl Context<'_> {
                 } else {
                     "only values in brackets may"
                 };
-                return Err(Fault::new(
+                return Err(LineError::new(
                     scanner.here(),
                     "o-word",
                     format!("{more} follow here"),
@@ -89,7 +89,7 @@ impl Context<'_> {
     fn deep_value(&self, scanner: &mut Scanner, depth: usize) -> Checked<f64> {
         scanner.skip_blanks();
         if depth > MAX_DEPTH {
-            return Err(Fault::new(
+            return Err(LineError::new(
                 scanner.here(),
                 "nesting",
                 "the expression is nested too deeply (32 levels)",
@@ -114,7 +114,7 @@ impl Context<'_> {
     fn bracket(&self, scanner: &mut Scanner, depth: usize) -> Checked<f64> {
         let start = scanner.at();
         if !scanner.take(b'[') {
-            return Err(Fault::new(scanner.here(), "bracket", "[ is missing"));
+            return Err(LineError::new(scanner.here(), "bracket", "[ is missing"));
         }
         let value = self.operation(scanner, depth + 1, 1)?;
         if !scanner.take(b']') {
@@ -128,7 +128,7 @@ impl Context<'_> {
             } else {
                 scanner.here()
             };
-            return Err(Fault::new(span, "bracket", what));
+            return Err(LineError::new(span, "bracket", what));
         }
         Ok(value)
     }
@@ -145,7 +145,7 @@ impl Context<'_> {
             let right = self.operation(scanner, depth, operator.strength() + 1)?;
             left = operator
                 .apply(left, right)
-                .map_err(|why| Fault::new(scanner.since(start), "arithmetic", why))?;
+                .map_err(|why| LineError::new(scanner.since(start), "arithmetic", why))?;
         }
         Ok(left)
     }
@@ -167,13 +167,13 @@ impl Context<'_> {
             };
         };
         let argument = self.bracket(scanner, depth)?;
-        function(argument).map_err(|why| Fault::new(scanner.since(start), "arithmetic", why))
+        function(argument).map_err(|why| LineError::new(scanner.since(start), "arithmetic", why))
     }
 
     fn arc_tangent(&self, scanner: &mut Scanner, depth: usize) -> Checked<f64> {
         let y = self.bracket(scanner, depth)?;
         if !scanner.take(b'/') {
-            return Err(Fault::new(
+            return Err(LineError::new(
                 scanner.here(),
                 "bracket",
                 "ATAN has two arguments: ATAN[y]/[x]",
@@ -189,7 +189,7 @@ impl Context<'_> {
         let opened = scanner.take(b'[');
         scanner.skip_blanks();
         if !opened || scanner.peek() != b'#' {
-            return Err(Fault::new(
+            return Err(LineError::new(
                 scanner.here(),
                 "bracket",
                 "EXISTS takes a parameter: EXISTS[#<name>]",
@@ -201,11 +201,11 @@ impl Context<'_> {
                 .parameters
                 .named(&name[..length], self.state, self.letters)
                 .is_some(),
-            Err(fault) if fault.code == "parameter-number" => false,
-            Err(fault) => return Err(fault),
+            Err(error) if error.code == "parameter-number" => false,
+            Err(error) => return Err(error),
         };
         if !scanner.take(b']') {
-            return Err(Fault::new(scanner.here(), "bracket", "] is missing"));
+            return Err(LineError::new(scanner.here(), "bracket", "] is missing"));
         }
         Ok(f64::from(u8::from(known)))
     }
@@ -222,7 +222,7 @@ impl Context<'_> {
                     .named(name, self.state, self.letters)
                     .ok_or_else(|| {
                         let message = unset(name);
-                        Fault::new(scanner.since(start), "parameter-unset", message)
+                        LineError::new(scanner.since(start), "parameter-unset", message)
                     })
             }
         }?;
@@ -245,9 +245,9 @@ impl Context<'_> {
         if (number - rounded).abs() > 1e-4 || !(1.0..=LAST as f64).contains(&rounded) {
             let message = format!(
                 "there is no parameter #{}: the numbers go from 1 to {LAST}",
-                crate::fault::show(number)
+                crate::line_error::show(number)
             );
-            return Err(Fault::new(
+            return Err(LineError::new(
                 scanner.since(start),
                 "parameter-number",
                 message,
@@ -307,7 +307,11 @@ fn name(scanner: &mut Scanner) -> Checked<Parameter> {
     scanner.advance(end + 1);
     if end == text.len() || length == 0 || length > MAX_NAME {
         let message = format!("a parameter name is 1 to {MAX_NAME} characters between < and >");
-        return Err(Fault::new(scanner.since(start), "parameter-name", message));
+        return Err(LineError::new(
+            scanner.since(start),
+            "parameter-name",
+            message,
+        ));
     }
     let mut name = [0; MAX_NAME];
     for (to, from) in name.iter_mut().zip(characters()) {
@@ -317,8 +321,8 @@ fn name(scanner: &mut Scanner) -> Checked<Parameter> {
 }
 
 #[cold]
-fn missing(span: Span) -> Fault {
-    Fault::new(
+fn missing(span: Span) -> LineError {
+    LineError::new(
         span,
         "value-missing",
         "a number, [expression], #parameter or function must follow",
@@ -326,16 +330,16 @@ fn missing(span: Span) -> Fault {
 }
 
 #[cold]
-fn no_function(span: Span, name: &[u8]) -> Fault {
+fn no_function(span: Span, name: &[u8]) -> LineError {
     let name = String::from_utf8_lossy(name);
     match &*name {
-        "NAN" | "INF" | "INFINITY" => Fault::new(
+        "NAN" | "INF" | "INFINITY" => LineError::new(
             span,
             "not-finite",
             format!("{name} is not a number that can be driven"),
         ),
         _ if name.len() < 2 => missing(span),
-        _ => Fault::new(
+        _ => LineError::new(
             span,
             "function",
             format!(

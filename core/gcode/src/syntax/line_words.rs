@@ -1,6 +1,6 @@
 //! The words of one line.
 
-use crate::fault::{Checked, Fault, Span};
+use crate::line_error::{Checked, LineError, Span};
 use crate::state::letters::{AXIS_MASK, index, mask};
 
 /// Most G words, and most M words, of a line.
@@ -23,7 +23,7 @@ pub(crate) struct Codes {
 impl Codes {
     pub fn push(&mut self, code: Code) -> Checked<()> {
         if self.count == MAX_CODES {
-            return Err(Fault::new(
+            return Err(LineError::new(
                 code.span,
                 "too-many",
                 format!("a line holds at most {MAX_CODES} G and M words each"),
@@ -129,7 +129,7 @@ impl LineWords {
         };
         match place.replace(value) {
             None => Ok(()),
-            Some(_) => Err(Fault::new(
+            Some(_) => Err(LineError::new(
                 span,
                 "word-twice",
                 format!("{} stands in this line twice", byte as char),
@@ -159,7 +159,7 @@ impl LineWords {
         let bit = 1 << index(letter);
         if self.present & bit != 0 {
             let message = format!("{} stands in this line twice", letter as char);
-            return Err(Fault::new(span, "word-twice", message));
+            return Err(LineError::new(span, "word-twice", message));
         }
         self.present |= bit;
         self.values[index(letter)] = value;
@@ -181,9 +181,9 @@ impl LineWords {
         self.spans[index(letter)]
     }
 
-    /// A fault at the word `letter`.
-    pub fn fault(&self, letter: u8, code: &'static str, message: impl Into<String>) -> Fault {
-        Fault::new(self.span(letter), code, message)
+    /// A error at the word `letter`.
+    pub fn error(&self, letter: u8, code: &'static str, message: impl Into<String>) -> LineError {
+        LineError::new(self.span(letter), code, message)
     }
 
     /// What is to be said of a word `letter` out of place where it is E right behind a number: X1e-5.
@@ -228,7 +228,7 @@ impl LineWords {
                 range.start(),
                 range.end()
             );
-            return Err(self.fault(letter, "word-range", message));
+            return Err(self.error(letter, "word-range", message));
         }
         Ok(Some(rounded as u32))
     }
@@ -236,7 +236,7 @@ impl LineWords {
     /// The word `letter` where it must not be negative; `None` where the line lacks it.
     pub fn not_negative(&self, letter: u8) -> Checked<Option<f64>> {
         match self.get(letter) {
-            Some(value) if value < 0.0 => Err(self.fault(
+            Some(value) if value < 0.0 => Err(self.error(
                 letter,
                 "word-range",
                 format!("{} must not be negative", letter as char),

@@ -1,7 +1,7 @@
 //! Decimal numbers: a sign, digits, a point, digits. There are no exponents in part programs.
 
 use super::scan::Scanner;
-use crate::fault::{Checked, Fault};
+use crate::line_error::{Checked, LineError};
 
 /// Most characters of a number.
 const MAX_LENGTH: usize = 64;
@@ -72,18 +72,18 @@ fn digits(text: &[u8], mut mantissa: u64) -> (u64, usize) {
 }
 
 #[cold]
-fn refuse(scanner: &Scanner, start: usize, digits: usize, length: usize) -> Fault {
+fn refuse(scanner: &Scanner, start: usize, digits: usize, length: usize) -> LineError {
     if length > MAX_LENGTH {
         let message = format!("the number has {length} characters, {MAX_LENGTH} are allowed");
-        Fault::new(scanner.since(start), "number-long", message)
+        LineError::new(scanner.since(start), "number-long", message)
     } else if digits == 0 {
-        Fault::new(
+        LineError::new(
             scanner.since(start),
             "number",
             "a number needs at least one digit",
         )
     } else {
-        Fault::new(
+        LineError::new(
             scanner.here(),
             "number",
             "a number has one decimal point only",

@@ -3,7 +3,7 @@
 use super::expression::{Context, Parameter};
 use super::line_words::{Assignment, Code, LineWords, Target};
 use super::scan::Scanner;
-use crate::fault::{Checked, Fault, Span};
+use crate::line_error::{Checked, LineError, Span};
 use crate::state::parameters::{predefined_name, read_only};
 
 /// Largest magnitude of a word: more is a slip, and would lose the precision of positions.
@@ -49,11 +49,11 @@ fn word(
     scanner.skip_blanks();
     let value = match context.value(scanner) {
         Ok(value) => value,
-        Err(fault) => return Err(in_word(letter, start, fault)),
+        Err(error) => return Err(in_word(letter, start, error)),
     };
     let span = scanner.since(start);
     if value.abs() > MAX_VALUE || value.is_nan() {
-        return Err(Fault::new(
+        return Err(LineError::new(
             span,
             "word-range",
             format!("{} is too large a number", letter as char),
@@ -75,10 +75,10 @@ fn polar(byte: u8, scanner: &mut Scanner, context: &Context, words: &mut LineWor
     scanner.skip_blanks();
     let value = context
         .value(scanner)
-        .map_err(|fault| in_word(byte, start, fault))?;
+        .map_err(|error| in_word(byte, start, error))?;
     let span = scanner.since(start);
     if value.abs() > MAX_VALUE || value.is_nan() {
-        return Err(Fault::new(
+        return Err(LineError::new(
             span,
             "word-range",
             format!("{} is too large a number", byte as char),
@@ -89,27 +89,27 @@ fn polar(byte: u8, scanner: &mut Scanner, context: &Context, words: &mut LineWor
 
 /// Adds which word lacks its value.
 #[cold]
-fn in_word(letter: u8, start: usize, fault: Fault) -> Fault {
+fn in_word(letter: u8, start: usize, error: LineError) -> LineError {
     if letter == b'O' {
-        let span = Span::new(start, fault.span.end.max(start as u32 + 1) as usize);
-        return Fault::new(span, "o-word", O_WORDS);
+        let span = Span::new(start, error.span.end.max(start as u32 + 1) as usize);
+        return LineError::new(span, "o-word", O_WORDS);
     }
-    if fault.code != "value-missing" {
-        return fault;
+    if error.code != "value-missing" {
+        return error;
     }
     let span = Span::new(start, start + 1);
-    Fault::new(
+    LineError::new(
         span,
-        fault.code,
-        format!("{} has no value: {}", letter as char, fault.message),
+        error.code,
+        format!("{} has no value: {}", letter as char, error.message),
     )
 }
 
 fn code(letter: char, value: f64, span: Span) -> Checked<Code> {
     let tenths = (value * 10.0).round();
     if (value * 10.0 - tenths).abs() > 1e-3 || !(0.0..=9999.0).contains(&tenths) {
-        let message = format!("{letter}{} is not known", crate::fault::show(value));
-        return Err(Fault::new(span, "unknown-code", message));
+        let message = format!("{letter}{} is not known", crate::line_error::show(value));
+        return Err(LineError::new(span, "unknown-code", message));
     }
     Ok(Code {
         tenths: tenths as u16,
@@ -132,7 +132,7 @@ fn program_number(
         return words.add(b'O', value, scanner.since(start));
     }
     scanner.advance(scanner.name().1);
-    Err(Fault::new(scanner.since(start), "o-word", O_WORDS))
+    Err(LineError::new(scanner.since(start), "o-word", O_WORDS))
 }
 
 /// `TA` with a value is the time constant; `TABS[…]` and the like are T with a function.
@@ -153,19 +153,19 @@ fn time_constant(scanner: &mut Scanner, context: &Context, words: &mut LineWords
     let start = scanner.at();
     scanner.advance(2);
     scanner.skip_blanks();
-    let value = context.value(scanner).map_err(|fault| {
-        if fault.code != "value-missing" {
-            return fault;
+    let value = context.value(scanner).map_err(|error| {
+        if error.code != "value-missing" {
+            return error;
         }
-        Fault::new(
+        LineError::new(
             Span::new(start, start + 2),
-            fault.code,
-            format!("TA has no value: {}", fault.message),
+            error.code,
+            format!("TA has no value: {}", error.message),
         )
     })?;
     let span = scanner.since(start);
     if words.time_constant.is_some() {
-        return Err(Fault::new(
+        return Err(LineError::new(
             span,
             "word-twice",
             "TA stands in this line twice",
@@ -190,7 +190,7 @@ fn assignment(scanner: &mut Scanner, context: &Context, words: &mut LineWords) -
     if let Target::Numbered(number) = target
         && let Some(why) = read_only(number)
     {
-        return Err(Fault::new(
+        return Err(LineError::new(
             span,
             "read-only",
             format!("parameter #{number} cannot be assigned: {why}"),
@@ -199,14 +199,14 @@ fn assignment(scanner: &mut Scanner, context: &Context, words: &mut LineWords) -
     if let Target::Named(range) = &target
         && predefined_name(&words.names[range.clone()], context.state, context.letters).is_some()
     {
-        return Err(Fault::new(
+        return Err(LineError::new(
             span,
             "read-only",
             "this parameter cannot be assigned: the interpreter keeps it itself",
         ));
     }
     if !scanner.take(b'=') {
-        return Err(Fault::new(
+        return Err(LineError::new(
             span,
             "assignment",
             "a parameter stands here for a word; an assignment needs =",
@@ -214,7 +214,7 @@ fn assignment(scanner: &mut Scanner, context: &Context, words: &mut LineWords) -
     }
     scanner.skip_blanks();
     let value = context.value(scanner);
-    // Where the value is at fault, zero stands in, so that later lines are not blamed for a parameter never set.
+    // Where the value is at error, zero stands in, so that later lines are not blamed for a parameter never set.
     words.assignments.push(Assignment {
         target,
         value: *value.as_ref().unwrap_or(&0.0),
@@ -224,7 +224,7 @@ fn assignment(scanner: &mut Scanner, context: &Context, words: &mut LineWords) -
 }
 
 #[cold]
-fn unexpected(byte: u8, span: Span) -> Fault {
+fn unexpected(byte: u8, span: Span) -> LineError {
     let why = match byte {
         b'0'..=b'9' | b'.' | b'+' | b'-' => "a number without a letter before it",
         b')' => "a comment ends here that has not begun",
@@ -235,5 +235,5 @@ fn unexpected(byte: u8, span: Span) -> Fault {
         0x80.. => "only comments may hold characters outside ASCII",
         _ => "no word begins with this character",
     };
-    Fault::new(span, "unexpected", why)
+    LineError::new(span, "unexpected", why)
 }

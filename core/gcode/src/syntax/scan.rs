@@ -1,6 +1,6 @@
 //! The cursor over the bytes of one line.
 
-use crate::fault::{Checked, Fault, Span};
+use crate::line_error::{Checked, LineError, Span};
 
 /// A cursor over one line. Blanks and comments may stand between any two words.
 pub(crate) struct Scanner<'t> {
@@ -95,7 +95,7 @@ impl<'t> Scanner<'t> {
         } else {
             "the comment is not closed: ) is missing"
         };
-        Err(Fault::new(self.since(start), "comment", message))
+        Err(LineError::new(self.since(start), "comment", message))
     }
 
     /// The run of letters that comes next, at most 8, upper case, zero-padded; the cursor stays.

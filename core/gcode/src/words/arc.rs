@@ -5,8 +5,8 @@ use tandem_sdk::{ArcGeometry, AxisVector, Block, BlockKind};
 use super::circle::{Ends, Part, Parts, extent, tolerance_mm};
 use super::modes::Plane;
 use super::{Action, Group, Shape, Word, compensation};
-use crate::fault::{Checked, Fault, Span};
 use crate::line::Line;
+use crate::line_error::{Checked, LineError, Span};
 
 pub(super) const WORDS: &[Word] = &[
     Word::new(
@@ -177,13 +177,13 @@ fn circle(line: &Line, ends: &Ends, plane: [usize; 2]) -> Checked<Parts> {
             "{} is no centre in this plane: {a} and {b} are (G17, G18, G19 choose)",
             foreign as char
         );
-        return Err(line.words.fault(foreign, "arc-centre", message));
+        return Err(line.words.error(foreign, "arc-centre", message));
     }
     let given = letters.map(|letter| line.words.get(letter));
     let arc = match (line.words.get(b'R'), given) {
         (Some(radius), [None, None]) => ends.of_radius(radius * line.state.modes.unit_mm),
         (Some(_), _) => {
-            return Err(line.words.fault(
+            return Err(line.words.error(
                 b'R',
                 "arc-centre",
                 "an arc has either R or I J K, not both",
@@ -228,7 +228,7 @@ fn center(
     Ok(plane.map(|axis| center[axis]))
 }
 
-fn no_center(line: &Line, letters: [u8; 2]) -> Fault {
+fn no_center(line: &Line, letters: [u8; 2]) -> LineError {
     let [a, b] = letters.map(char::from);
     line.motion_fault(
         "arc-centre",
@@ -236,8 +236,8 @@ fn no_center(line: &Line, letters: [u8; 2]) -> Fault {
     )
 }
 
-/// A fault at the words of the circle.
-fn arc_fault(line: &Line, letters: [u8; 2], code: &'static str, message: String) -> Fault {
+/// A error at the words of the circle.
+fn arc_fault(line: &Line, letters: [u8; 2], code: &'static str, message: String) -> LineError {
     let spans = [letters[0], letters[1], b'R']
         .into_iter()
         .filter(|l| line.words.has(*l))
@@ -246,7 +246,7 @@ fn arc_fault(line: &Line, letters: [u8; 2], code: &'static str, message: String)
         start: a.start.min(b.start),
         end: a.end.max(b.end),
     });
-    Fault::new(span.unwrap_or_default(), code, message)
+    LineError::new(span.unwrap_or_default(), code, message)
 }
 
 fn check_arc_travel(

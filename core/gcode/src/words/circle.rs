@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use tandem_sdk::ArcGeometry;
 
-use crate::fault::show;
+use crate::line_error::show;
 
 /// Start and end radius may differ by what rounding to 0.01 mm, or to 0.001 inch, makes of them: LinuxCNC's values.
 const ROUNDED_MM: f64 = 0.02 * std::f64::consts::SQRT_2;

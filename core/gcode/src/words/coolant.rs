@@ -3,8 +3,8 @@
 use tandem_sdk::EventKind;
 
 use super::{Action, Group, Word};
-use crate::fault::Checked;
 use crate::line::Line;
+use crate::line_error::Checked;
 
 pub(super) const WORDS: &[Word] = &[
     Word::new(
@@ -55,7 +55,7 @@ fn flood_on(line: &mut Line) -> Checked<()> {
 fn off(line: &mut Line) -> Checked<()> {
     if line.orders.has(Group::Mist) || line.orders.has(Group::Flood) {
         let message = "M9 and M7 or M8 exclude each other in a line";
-        return Err(line.orders.fault(Group::CoolantOff, "conflict", message));
+        return Err(line.orders.error(Group::CoolantOff, "conflict", message));
     }
     stop(line);
     Ok(())

@@ -4,8 +4,8 @@ use tandem_sdk::AxisVector;
 
 use super::{Action, Group, Word, nothing, tool};
 use crate::config::Tool;
-use crate::fault::Checked;
 use crate::line::Line;
+use crate::line_error::Checked;
 use crate::state::coordinates::SYSTEMS;
 use crate::state::letters::AXIS_MASK;
 
@@ -195,7 +195,7 @@ fn restore_g92(line: &mut Line) -> Checked<()> {
 /// G92: the offset that gives the current position the named coordinates.
 fn set_position_offset(line: &mut Line) -> Checked<()> {
     if line.words.present & AXIS_MASK == 0 {
-        return Err(line.orders.fault(
+        return Err(line.orders.error(
             Group::NonModal,
             "axis-missing",
             "G92 needs at least one axis word",
@@ -251,9 +251,9 @@ fn set_data(line: &mut Line) -> Checked<()> {
             let message = format!(
                 "G10 L{other} is not known: L1, L10 and L11 (tools), L2 and L20 (systems) are"
             );
-            Err(line.words.fault(b'L', "refused", message))
+            Err(line.words.error(b'L', "refused", message))
         }
-        None => Err(line.orders.fault(
+        None => Err(line.orders.error(
             Group::NonModal,
             "word-missing",
             "G10 needs L: 1, 2, 10, 11 or 20",
@@ -268,7 +268,7 @@ fn system(line: &Line) -> Checked<usize> {
         Some(number) => Ok(number as usize - 1),
         None => {
             let message = "G10 needs P, the coordinate system (0 to 9)";
-            Err(line.orders.fault(Group::NonModal, "word-missing", message))
+            Err(line.orders.error(Group::NonModal, "word-missing", message))
         }
     }
 }
@@ -284,7 +284,7 @@ fn set_system(line: &mut Line) -> Checked<()> {
         if degrees != 0.0 && !line.state.coordinates.can_rotate() {
             return Err(line
                 .words
-                .fault(b'R', "axis", "a rotation needs the linear axes X and Y"));
+                .error(b'R', "axis", "a rotation needs the linear axes X and Y"));
         }
         line.state
             .coordinates
@@ -299,7 +299,7 @@ fn set_system(line: &mut Line) -> Checked<()> {
 fn set_system_here(line: &mut Line) -> Checked<()> {
     let system = system(line)?;
     if line.words.has(b'R') {
-        return Err(line.words.fault(
+        return Err(line.words.error(
             b'R',
             "unused-word",
             "G10 L20 takes no R: L2 sets the rotation",
@@ -337,7 +337,7 @@ enum ToolOrigin {
 /// G10 L1, L10, L11: a row of the tool table, for this run only. It acts with the next G43.
 fn set_tool(line: &mut Line, from: ToolOrigin) -> Checked<()> {
     let Some(number) = line.words.integer(b'P', 1..=tool::MAX_TOOL)? else {
-        return Err(line.orders.fault(
+        return Err(line.orders.error(
             Group::NonModal,
             "word-missing",
             "G10 needs P, the number of the tool",
@@ -361,7 +361,7 @@ fn set_tool(line: &mut Line, from: ToolOrigin) -> Checked<()> {
     else {
         return Err(line
             .words
-            .fault(b'P', "tool", format!("the tool table has no tool {number}")));
+            .error(b'P', "tool", format!("the tool table has no tool {number}")));
     };
     let at = match from {
         ToolOrigin::Value => AxisVector::ZERO,
@@ -388,7 +388,7 @@ fn set_tool(line: &mut Line, from: ToolOrigin) -> Checked<()> {
     if line.state.tools.set(tool) {
         Ok(())
     } else {
-        Err(line.words.fault(b'P', "tool", "the tool table is full"))
+        Err(line.words.error(b'P', "tool", "the tool table is full"))
     }
 }
 

@@ -5,8 +5,8 @@ use tandem_sdk::{AxisVector, BlockKind, EventKind};
 use super::modes::FeedMode;
 use super::overrides::{self, FEED, SPINDLE};
 use super::{Action, Group, Shape, Word, motion, spindle};
-use crate::fault::{Checked, Fault};
 use crate::line::Line;
+use crate::line_error::{Checked, LineError};
 use crate::state::letters::{Letters, mask};
 
 pub(super) const WORDS: &[Word] = &[
@@ -326,7 +326,7 @@ fn sticky(line: &mut Line, kind: Kind, normal: u8) -> Checked<Sticky> {
         peck_mm: given(b'Q').or(left.peck_mm),
         dwell_s: line.words.not_negative(b'P')?.or(left.dwell_s),
     };
-    let missing = |what: &str| -> Fault {
+    let missing = |what: &str| -> LineError {
         line.motion_fault(
             "word-missing",
             format!("{} needs {what}", line.orders.motion_code()),

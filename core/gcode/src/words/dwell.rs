@@ -1,8 +1,8 @@
 //! G4: dwell.
 
 use super::{Action, Group, Word};
-use crate::fault::Checked;
 use crate::line::Line;
+use crate::line_error::Checked;
 
 pub(super) const WORDS: &[Word] = &[Word::new(
     "G4",
@@ -15,7 +15,7 @@ pub(super) const WORDS: &[Word] = &[Word::new(
 
 fn dwell(line: &mut Line) -> Checked<()> {
     let missing = || {
-        line.orders.fault(
+        line.orders.error(
             Group::NonModal,
             "word-missing",
             "G4 needs P, the dwell in seconds",

@@ -3,8 +3,8 @@
 use tandem_sdk::{AxisVector, BlockKind};
 
 use super::{Action, Group, Word, motion, spindle};
-use crate::fault::Checked;
 use crate::line::Line;
+use crate::line_error::Checked;
 
 pub(super) const WORDS: &[Word] = &[
     Word::new(

@@ -34,8 +34,8 @@ mod user;
 
 use std::fmt::Write as _;
 
-use crate::fault::Checked;
 use crate::line::Line;
+use crate::line_error::Checked;
 use crate::state::letters::mask;
 
 /// Words of one group exclude each other in a line. The groups stand in the order in which they take effect.

@@ -7,8 +7,8 @@ use super::modes::Modes;
 use super::overrides::{self, Permits};
 use super::spindle::{self, Spindle};
 use super::{Action, Group, Word};
-use crate::fault::Checked;
 use crate::line::Line;
+use crate::line_error::Checked;
 
 pub(super) const WORDS: &[Word] = &[
     Word::new(
@@ -133,7 +133,7 @@ fn forget(line: &mut Line) -> Checked<()> {
 fn restore(line: &mut Line) -> Checked<()> {
     let Some(saved) = line.state.saved.level().saved.clone() else {
         let message = "no modal state has been saved in this call: M70 or M73 must come before";
-        return Err(line.orders.fault(Group::ModalState, "modal-state", message));
+        return Err(line.orders.error(Group::ModalState, "modal-state", message));
     };
     put_back(line, &saved);
     Ok(())

@@ -4,8 +4,8 @@ use std::f64::consts::PI;
 
 use super::{Action, Group, Word, nothing};
 use crate::config::Config;
-use crate::fault::{Checked, Fault, show};
 use crate::line::Line;
+use crate::line_error::{Checked, LineError, show};
 use crate::state::letters::Letters;
 
 pub(super) const WORDS: &[Word] = &[
@@ -415,7 +415,7 @@ pub(crate) fn time_constant(line: &mut Line) -> Checked<()> {
     if let Some((value_ms, span)) = line.words.time_constant {
         let why = refuse_time_constant(value_ms, line.config);
         why.map_or(Ok(()), |message| {
-            Err(Fault::new(span, "time-constant", message))
+            Err(LineError::new(span, "time-constant", message))
         })?;
         line.state.modes.time_constant_s = value_ms / 1000.0;
     }

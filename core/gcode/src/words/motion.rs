@@ -3,8 +3,8 @@
 use tandem_sdk::{Block, BlockKind};
 
 use super::{Action, Group, Shape, Word, compensation, lathe};
-use crate::fault::Checked;
 use crate::line::Line;
+use crate::line_error::Checked;
 
 pub(super) const WORDS: &[Word] = &[
     Word::new(
@@ -37,7 +37,7 @@ pub(super) const WORDS: &[Word] = &[
 #[inline]
 fn refuse_distance(line: &Line) -> Checked<()> {
     if line.in_machine_coordinates() && !line.state.modes.absolute {
-        return Err(line.orders.fault(
+        return Err(line.orders.error(
             Group::NonModal,
             "conflict",
             "G53 does not go with G91: machine coordinates are absolute",

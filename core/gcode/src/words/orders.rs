@@ -1,7 +1,7 @@
 //! The G and M words of a line, sorted by group and checked against each other and against the other words.
 
 use super::{Action, GROUPS, Group, Shape, Word, written};
-use crate::fault::{Checked, Fault, Span};
+use crate::line_error::{Checked, LineError, Span};
 use crate::state::MotionMode;
 use crate::state::letters::{AXIS_MASK, Letters, index, mask};
 use crate::syntax::line_words::{Code, LineWords, Polar};
@@ -70,12 +70,12 @@ impl Orders {
         }
     }
 
-    /// A fault at the word of `group`.
-    pub fn fault(&self, group: Group, code: &'static str, message: impl Into<String>) -> Fault {
-        Fault::new(self.words[group as usize].1, code, message)
+    /// A error at the word of `group`.
+    pub fn error(&self, group: Group, code: &'static str, message: impl Into<String>) -> LineError {
+        LineError::new(self.words[group as usize].1, code, message)
     }
 
-    /// Sorts the words of a line; `modal` is the motion mode before it. After a fault what is not at fault is sorted
+    /// Sorts the words of a line; `modal` is the motion mode before it. After a error what is not at error is sorted
     /// all the same, so that reading can go on.
     #[inline]
     pub fn sort(&mut self, words: &LineWords, modal: MotionMode, letters: &Letters) -> Checked<()> {
@@ -124,7 +124,7 @@ impl Orders {
                 self.motion = Some(MotionMode::Refused);
             }
             let message = format!("{} ({}): {why}", word.code, word.meaning);
-            return Err(Fault::new(code.span, "refused", message));
+            return Err(LineError::new(code.span, "refused", message));
         }
         if let Some(other) = self.get(word.group) {
             return Err(conflict(word, other, code.span));
@@ -155,7 +155,7 @@ impl Orders {
             .filter(|motion| matches!(motion, MotionMode::Refused));
         let word = self.get(Group::Motion);
         if word.is_some_and(|word| word.shape().is_none()) {
-            return Err(self.fault(Group::Motion, "nurbs", super::curve::NONE_OPEN));
+            return Err(self.error(Group::Motion, "nurbs", super::curve::NONE_OPEN));
         }
         if self.axes_taken {
             words
@@ -203,7 +203,7 @@ impl Orders {
                 "the axis words belong to {}, not to a motion: split the line",
                 taker.code
             );
-            return Err(self.fault(Group::Motion, "conflict", message));
+            return Err(self.error(Group::Motion, "conflict", message));
         }
         Ok(())
     }
@@ -245,7 +245,7 @@ fn check_polar(
     if linear(b'X') && linear(b'Y') {
         return Ok(());
     }
-    Err(Fault::new(
+    Err(LineError::new(
         polar.span,
         "axis",
         "polar coordinates (@ and ^) need the linear axes X and Y",
@@ -253,14 +253,14 @@ fn check_polar(
 }
 
 #[cold]
-pub(crate) fn polar_misplaced(polar: &Polar) -> Fault {
+pub(crate) fn polar_misplaced(polar: &Polar) -> LineError {
     let message = "polar coordinates (@ and ^) stand for X and Y of a line, an arc, a probe or a cycle: neither go they \
                    with X and Y, nor with G53 and words that take axis words for something else";
-    Fault::new(polar.span, "conflict", message)
+    LineError::new(polar.span, "conflict", message)
 }
 
 #[cold]
-fn conflict(word: &Word, other: &Word, span: Span) -> Fault {
+fn conflict(word: &Word, other: &Word, span: Span) -> LineError {
     let message = if word.group == Group::User {
         "a line holds one of the commands M100 to M199".to_owned()
     } else if word.tenths == other.tenths {
@@ -273,7 +273,7 @@ fn conflict(word: &Word, other: &Word, span: Span) -> Fault {
             word.group.name()
         )
     };
-    Fault::new(span, "conflict", message)
+    LineError::new(span, "conflict", message)
 }
 
 /// The letters that the words of the line take.
@@ -296,23 +296,23 @@ impl Claims {
             "{word} takes {}, but so does another word of this line: split it",
             shared as char
         );
-        Err(Fault::new(span, "ambiguous", message))
+        Err(LineError::new(span, "ambiguous", message))
     }
 }
 
 #[cold]
-fn unknown(letter: char, code: Code) -> Fault {
+fn unknown(letter: char, code: Code) -> LineError {
     let word = written(letter, code.tenths);
-    Fault::new(code.span, "unknown-code", format!("{word} is not known"))
+    LineError::new(code.span, "unknown-code", format!("{word} is not known"))
 }
 
 #[cold]
-fn no_motion(words: &LineWords) -> Fault {
+fn no_motion(words: &LineWords) -> LineError {
     let span = words
         .first_of(AXIS_MASK)
         .map(|(_, span)| span)
         .unwrap_or_default();
-    Fault::new(
+    LineError::new(
         span,
         "motion-missing",
         "no motion mode is in force: G0, G1, G2 or G3 is missing",
@@ -321,7 +321,7 @@ fn no_motion(words: &LineWords) -> Fault {
 
 /// The first word that the machine or the line has no use for.
 #[cold]
-fn misplaced(words: &LineWords, claimed: u32, letters: &Letters) -> Fault {
+fn misplaced(words: &LineWords, claimed: u32, letters: &Letters) -> LineError {
     let foreign = AXIS_MASK & !letters.mask;
     let useless = !(ALWAYS | claimed) | foreign;
     let (letter, span) = words.first_of(useless).unwrap_or_default();
@@ -331,14 +331,14 @@ fn misplaced(words: &LineWords, claimed: u32, letters: &Letters) -> Fault {
     }
     let takers = takers(letter);
     if takers.is_empty() {
-        return Fault::new(
+        return LineError::new(
             span,
             "unknown-word",
             format!("the word {name} is not known"),
         );
     }
     let exponent = words.exponent(letter);
-    Fault::new(
+    LineError::new(
         span,
         "unused-word",
         format!("nothing in this line takes the word {name} ({takers} would){exponent}"),
@@ -347,8 +347,8 @@ fn misplaced(words: &LineWords, claimed: u32, letters: &Letters) -> Fault {
 
 /// An axis that the machine lacks.
 #[cold]
-pub(crate) fn no_axis(letter: u8, span: Span, letters: &Letters) -> Fault {
-    Fault::new(
+pub(crate) fn no_axis(letter: u8, span: Span, letters: &Letters) -> LineError {
+    LineError::new(
         span,
         "axis",
         format!(

@@ -3,9 +3,9 @@
 use tandem_sdk::EventKind;
 
 use super::{Action, Group, Word};
-use crate::fault::{Checked, Fault};
 use crate::item::{Input, InputMode, InputWait, Item};
 use crate::line::Line;
+use crate::line_error::{Checked, LineError};
 
 pub(super) const WORDS: &[Word] = &[
     Word::new(
@@ -110,7 +110,7 @@ impl Outputs {
 /// by then.
 fn switch(line: &mut Line, on: bool, at_rest: bool) -> Checked<()> {
     let missing = || {
-        line.orders.fault(
+        line.orders.error(
             Group::InputOutput,
             "word-missing",
             "P, the number of the output, is missing",
@@ -121,7 +121,7 @@ fn switch(line: &mut Line, on: bool, at_rest: bool) -> Checked<()> {
         .integer(b'P', 0..=MAX_OUTPUT)?
         .ok_or_else(missing)?;
     if let Some(refusal) = line.config.outputs.refusal("output", number) {
-        return Err(line.words.fault(b'P', "output", refusal));
+        return Err(line.words.error(b'P', "output", refusal));
     }
     if line.state.outputs.set(number, on) {
         if at_rest {
@@ -134,7 +134,7 @@ fn switch(line: &mut Line, on: bool, at_rest: bool) -> Checked<()> {
 
 /// M67 and M68.
 fn set_analog(line: &mut Line, at_rest: bool) -> Checked<()> {
-    let missing = |what| line.orders.fault(Group::InputOutput, "word-missing", what);
+    let missing = |what| line.orders.error(Group::InputOutput, "word-missing", what);
     let number = line
         .words
         .integer(b'E', 0..=63)?
@@ -148,7 +148,7 @@ fn set_analog(line: &mut Line, at_rest: bool) -> Checked<()> {
         .analog_outputs
         .refusal("analogue output", number)
     {
-        return Err(line.words.fault(b'E', "output", refusal));
+        return Err(line.words.error(b'E', "output", refusal));
     }
     if at_rest {
         line.rest();
@@ -163,11 +163,11 @@ fn wait(line: &mut Line) -> Checked<()> {
         line.words.integer(b'E', 0..=63)?,
     ) {
         (Some(number), None) => match line.config.inputs.refusal("input", number) {
-            Some(refusal) => return Err(line.words.fault(b'P', "input", refusal)),
+            Some(refusal) => return Err(line.words.error(b'P', "input", refusal)),
             None => Input::Digital(number),
         },
         (None, Some(number)) => match line.config.analog_inputs.refusal("analogue input", number) {
-            Some(refusal) => return Err(line.words.fault(b'E', "input", refusal)),
+            Some(refusal) => return Err(line.words.error(b'E', "input", refusal)),
             None => Input::Analog(number),
         },
         (Some(_), Some(_)) => {
@@ -215,8 +215,8 @@ fn wait(line: &mut Line) -> Checked<()> {
     Ok(())
 }
 
-fn wait_fault(line: &Line, message: &str) -> Fault {
-    line.orders.fault(Group::InputOutput, "input", message)
+fn wait_fault(line: &Line, message: &str) -> LineError {
+    line.orders.error(Group::InputOutput, "input", message)
 }
 
 #[cfg(test)]

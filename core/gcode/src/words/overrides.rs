@@ -3,8 +3,8 @@
 use tandem_sdk::EventKind;
 
 use super::{Action, Group, Word};
-use crate::fault::Checked;
 use crate::line::Line;
+use crate::line_error::Checked;
 
 pub(super) const WORDS: &[Word] = &[
     Word::new(

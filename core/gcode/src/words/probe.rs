@@ -4,9 +4,9 @@ use tandem_sdk::{AxisVector, Block, BlockKind, Edge, StopOn};
 
 use super::modes::FeedMode;
 use super::{Action, Group, Shape, Word};
-use crate::fault::Checked;
 use crate::item::ProbeResult;
 use crate::line::Line;
+use crate::line_error::Checked;
 use crate::state::State;
 use crate::state::letters::{AXIS_LETTERS, Letters};
 use crate::state::parameters::Parameters;

@@ -5,8 +5,8 @@ use std::f64::consts::PI;
 use tandem_sdk::{AxisVector, EventKind};
 
 use super::{Action, Group, Word};
-use crate::fault::Checked;
 use crate::line::Line;
+use crate::line_error::Checked;
 
 pub(super) const WORDS: &[Word] = &[
     Word::new(
@@ -133,14 +133,14 @@ fn surface_speed(line: &mut Line) -> Checked<()> {
         .axis(b'X')
         .is_none_or(|axis| line.letters.is_rotary(axis))
     {
-        return Err(line.orders.fault(
+        return Err(line.orders.error(
             Group::SpindleMode,
             "axis",
             "G96 needs the linear axis X, the radius",
         ));
     }
     if !line.words.has(b'S') {
-        return Err(line.orders.fault(
+        return Err(line.orders.error(
             Group::SpindleMode,
             "word-missing",
             "G96 needs S, the speed of the surface",
@@ -179,13 +179,13 @@ pub(super) fn follow_radius(line: &mut Line, radius_mm: f64) {
 
 /// M19: rest, and the spindle is turned to an angle and held there.
 fn orient(line: &mut Line) -> Checked<()> {
-    let missing = |message: &str| line.orders.fault(Group::Spindle, "word-missing", message);
+    let missing = |message: &str| line.orders.error(Group::Spindle, "word-missing", message);
     let degrees = line
         .words
         .get(b'R')
         .ok_or_else(|| missing("M19 needs R, the angle in degrees"))?;
     if !(0.0..360.0).contains(&degrees) {
-        return Err(line.words.fault(
+        return Err(line.words.error(
             b'R',
             "word-range",
             "R, the angle of the spindle, is 0 to less than 360 degrees",
@@ -196,7 +196,7 @@ fn orient(line: &mut Line) -> Checked<()> {
     if !line.config.orients_spindle {
         let message =
             "M19 (oriented spindle stop): no driver of this machine turns the spindle to an angle";
-        return Err(line.orders.fault(Group::Spindle, "refused", message));
+        return Err(line.orders.error(Group::Spindle, "refused", message));
     }
     turn(line, 0)?;
     line.rest();

@@ -3,9 +3,9 @@
 use tandem_sdk::EventKind;
 
 use super::{Action, Group, Word, compensation, coolant, spindle};
-use crate::fault::Checked;
 use crate::item::Item;
 use crate::line::Line;
+use crate::line_error::Checked;
 
 pub(super) const WORDS: &[Word] = &[
     Word::new(

@@ -1,8 +1,8 @@
 //! M98 and M99: subprograms, which begin with their number in a line of its own.
 
 use super::{Action, Group, Word};
-use crate::fault::{Checked, Span};
 use crate::line::Line;
+use crate::line_error::{Checked, Span};
 
 pub(super) const WORDS: &[Word] = &[
     Word::new(
@@ -51,7 +51,7 @@ fn call(line: &mut Line) -> Checked<()> {
     of_a_program(line)?;
     let Some(number) = line.words.integer(b'P', 0..=MAX_NUMBER)? else {
         let message = "M98 needs P, the number of the subprogram";
-        return Err(line.orders.fault(Group::Stop, "word-missing", message));
+        return Err(line.orders.error(Group::Stop, "word-missing", message));
     };
     let times = line.words.integer(b'L', 0..=MAX_NUMBER)?.unwrap_or(1);
     if times > 0 {
@@ -75,7 +75,7 @@ fn of_a_program(line: &Line) -> Checked<()> {
         return Ok(());
     }
     let message = "subprograms belong to a program: manual input has none";
-    Err(line.orders.fault(Group::Stop, "refused", message))
+    Err(line.orders.error(Group::Stop, "refused", message))
 }
 
 #[cfg(test)]

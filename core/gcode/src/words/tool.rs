@@ -3,8 +3,8 @@
 use tandem_sdk::{AxisVector, EventKind};
 
 use super::{Action, Group, Word, spindle};
-use crate::fault::Checked;
 use crate::line::Line;
+use crate::line_error::Checked;
 use crate::state::letters::AXIS_MASK;
 
 pub(super) const WORDS: &[Word] = &[
@@ -69,7 +69,7 @@ pub(crate) fn select(line: &mut Line) -> Checked<()> {
     if number != 0 && !line.config.tools.is_empty() && line.state.tools.find(number).is_none() {
         return Err(line
             .words
-            .fault(b'T', "tool", format!("the tool table has no tool {number}")));
+            .error(b'T', "tool", format!("the tool table has no tool {number}")));
     }
     if line.state.tools.selected != Some(number) {
         line.state.tools.selected = Some(number);
@@ -111,7 +111,7 @@ fn offset_of(line: &mut Line, number: u32) -> Checked<AxisVector> {
     if number != 0 && !without_table {
         return Err(line
             .orders
-            .fault(Group::ToolLength, "tool", no_tool(line, number)));
+            .error(Group::ToolLength, "tool", no_tool(line, number)));
     }
     if number != 0 {
         line.state.tools.assumed_zero.get_or_insert(line.state.line);
@@ -128,7 +128,7 @@ pub(super) fn diameter_of(line: &mut Line, number: u32) -> Checked<f64> {
     if number != 0 && !without_table {
         return Err(line
             .orders
-            .fault(Group::CutterRadius, "tool", no_tool(line, number)));
+            .error(Group::CutterRadius, "tool", no_tool(line, number)));
     }
     if number != 0 {
         line.state.tools.assumed_zero.get_or_insert(line.state.line);
@@ -158,7 +158,7 @@ fn with_words(line: &Line, add: bool) -> AxisVector {
 
 fn length_from_words(line: &mut Line) -> Checked<()> {
     if line.words.present & AXIS_MASK == 0 {
-        return Err(line.orders.fault(
+        return Err(line.orders.error(
             Group::ToolLength,
             "axis-missing",
             "G43.1 needs at least one axis word",
@@ -180,7 +180,7 @@ fn more_length(line: &mut Line) -> Checked<()> {
             let message = "G43.2 needs either H, a tool, or axis words";
             return Err(line
                 .orders
-                .fault(Group::ToolLength, "word-missing", message));
+                .error(Group::ToolLength, "word-missing", message));
         }
     };
     line.state.coordinates.set_tool(offset);
@@ -190,7 +190,7 @@ fn more_length(line: &mut Line) -> Checked<()> {
 /// M61.
 fn set_number(line: &mut Line) -> Checked<()> {
     let missing = || {
-        line.orders.fault(
+        line.orders.error(
             Group::ToolChange,
             "word-missing",
             "M61 needs Q, the number of the tool",
@@ -203,7 +203,7 @@ fn set_number(line: &mut Line) -> Checked<()> {
     if number != 0 && !line.config.tools.is_empty() && line.state.tools.find(number).is_none() {
         return Err(line
             .words
-            .fault(b'Q', "tool", format!("the tool table has no tool {number}")));
+            .error(b'Q', "tool", format!("the tool table has no tool {number}")));
     }
     line.state.tools.in_spindle = number;
     Ok(())

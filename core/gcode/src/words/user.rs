@@ -4,9 +4,9 @@ use tandem_sdk::EventKind;
 
 use super::{Action, Group, Word};
 use crate::config::FIRST_USER_COMMAND;
-use crate::fault::Checked;
 use crate::item::{Item, UserCommand};
 use crate::line::Line;
+use crate::line_error::Checked;
 
 pub(super) const WORDS: &[Word] = &[Word::new(
     "M100",
@@ -30,7 +30,7 @@ fn command(line: &mut Line) -> Checked<()> {
         let message = format!(
             "M{code}: the machine file lists no such command ([user_commands] M{code} = \"program\")"
         );
-        return Err(line.orders.fault(Group::User, "refused", message));
+        return Err(line.orders.error(Group::User, "refused", message));
     }
     line.rest();
     let [p, q] = [b'P', b'Q'].map(|letter| line.words.get(letter));

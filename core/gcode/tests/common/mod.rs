@@ -137,6 +137,7 @@ fn show(item: &Item) -> String {
             "{}: Command {} {:?} {:?} before {}",
             c.line, c.number, c.p, c.q, c.before_block
         ),
+        Item::Stated { which, value } => format!("stated {which} {}", short(*value)),
         Item::End => "End".into(),
     }
 }

@@ -101,7 +101,7 @@ pub fn ours(path: &Path, config: &Config) -> Result<Driven, String> {
                     });
                 }
                 Item::Block(block, None) => moves.push(step(&block)),
-                Item::Event(_) | Item::End => {}
+                Item::Event(_) | Item::Stated { .. } | Item::End => {}
             }
         }
     }
@@ -158,13 +158,15 @@ pub fn parting(mine: &Driven, theirs: &[Move]) -> Option<String> {
     })
 }
 
-/// The judge: named by `RS274`, or on the path.
+/// The judge: named by `RS274`, on the path, or where `tests/judge/install` has put it.
 pub fn judge() -> Option<PathBuf> {
     if let Some(path) = std::env::var_os("RS274") {
         return Some(path.into());
     }
-    let path = std::env::var_os("PATH")?;
+    let installed = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/rs274");
+    let path = std::env::var_os("PATH").unwrap_or_default();
     std::env::split_paths(&path)
+        .chain([installed])
         .map(|folder| folder.join("rs274"))
         .find(|file| file.is_file())
 }

@@ -1,7 +1,7 @@
 //! Random programs, judged by the interpreter of another control, rs274: both must say the same moves, or both refuse.
 //!
-//! The judge is the command `rs274` of Debian's package linuxcnc-uspace, on the path or named by `RS274`; where it is not
-//! installed nothing is judged, which the test prints. `JUDGE_PROGRAMS=5000` judges more programs, `JUDGE_SEED=17` one.
+//! The judge is the command `rs274` of Debian's package linuxcnc-uspace, on the path, named by `RS274`, or where
+//! `core/gcode/tests/judge/install` puts it; where there is none nothing is judged, which the test prints. `JUDGE_PROGRAMS=5000` judges more programs, `JUDGE_SEED=17` one.
 
 mod canon;
 #[path = "../common/mod.rs"]
@@ -64,10 +64,10 @@ fn difference(text: &str, judge: &Path, folder: &Path) -> Option<String> {
 /// Writes a program from a seed.
 type Writer = fn(u64) -> String;
 
-fn judge_all(kind: &str, count: u64, least_tenths: u64, program: Writer) {
+fn judge_all(kind: &str, count: u64, min_tenths: u64, program: Writer) {
     let Some(judge) = judge() else {
         println!(
-            "skipped: rs274 (Debian's linuxcnc-uspace) is not installed, and RS274 names none"
+            "skipped: rs274 (Debian's linuxcnc-uspace) is not there: core/gcode/tests/judge/install gets it"
         );
         return;
     };
@@ -105,10 +105,10 @@ fn judge_all(kind: &str, count: u64, least_tenths: u64, program: Writer) {
         wrong.len(),
         wrong.iter().take(5).cloned().collect::<Vec<_>>().join("\n")
     );
-    let enough = taken * 10 >= (seeds.end - seeds.start) * least_tenths;
+    let enough = taken * 10 >= (seeds.end - seeds.start) * min_tenths;
     assert!(
         enough,
-        "{least_tenths} of ten of these programs are valid, {taken} were taken"
+        "{min_tenths} of ten of these programs are valid, {taken} were taken"
     );
 }
 

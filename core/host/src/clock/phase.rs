@@ -32,9 +32,9 @@ pub struct PhaseSteering {
     /// Share of a deviation that is taken for drift.
     integral: f64,
     /// Half a period: a phase further off is nearer to the next exchange.
-    most_phase_ns: f64,
-    most_shift_ns: f64,
-    most_drift_ns: f64,
+    max_phase_ns: f64,
+    max_shift_ns: f64,
+    max_drift_ns: f64,
     /// How far the clocks drift apart in a period, as far as is known.
     drift_ns: f64,
     /// What of the corrections so far is less than a ns.
@@ -49,9 +49,9 @@ impl PhaseSteering {
         Self {
             proportional,
             integral: proportional * proportional / 4.0,
-            most_phase_ns: 0.5 * period_ns,
-            most_shift_ns: MAX_SHIFT * period_ns,
-            most_drift_ns: MAX_DRIFT * period_ns,
+            max_phase_ns: 0.5 * period_ns,
+            max_shift_ns: MAX_SHIFT * period_ns,
+            max_drift_ns: MAX_DRIFT * period_ns,
             drift_ns: 0.0,
             rest_ns: 0.0,
         }
@@ -61,13 +61,13 @@ impl PhaseSteering {
     /// it. Where that is not told, the drift that is known is made up for. Fine thread; does not allocate.
     pub fn sooner_ns(&mut self, phase_ns: Option<i64>) -> i64 {
         let phase_ns = phase_ns.map_or(0.0, |ns| {
-            (ns as f64).clamp(-self.most_phase_ns, self.most_phase_ns)
+            (ns as f64).clamp(-self.max_phase_ns, self.max_phase_ns)
         });
         let wanted_ns = self.proportional * phase_ns + self.drift_ns;
-        let shift_ns = wanted_ns.clamp(-self.most_shift_ns, self.most_shift_ns);
+        let shift_ns = wanted_ns.clamp(-self.max_shift_ns, self.max_shift_ns);
         if shift_ns == wanted_ns {
             let drift_ns = self.drift_ns + self.integral * phase_ns;
-            self.drift_ns = drift_ns.clamp(-self.most_drift_ns, self.most_drift_ns);
+            self.drift_ns = drift_ns.clamp(-self.max_drift_ns, self.max_drift_ns);
         }
         let exact_ns = shift_ns + self.rest_ns;
         let whole_ns = exact_ns.round();

@@ -15,13 +15,20 @@ use super::share::Share;
 struct Joints {
     machine: [u8; MAX_AXES],
     count: usize,
+    /// They follow each other on the machine, as most do, from this one on.
+    first: Option<usize>,
 }
 
 impl Joints {
     fn of(share: &Share) -> Self {
+        let first = match share.joints.runs() {
+            [run] => Some(run.machine as usize),
+            _ => None,
+        };
         let mut this = Self {
             machine: [0; MAX_AXES],
             count: 0,
+            first,
         };
         for (machine, (_, joint)) in this.machine.iter_mut().zip(share.joints.pairs()) {
             *machine = joint as u8;
@@ -80,23 +87,31 @@ impl Part {
     /// Takes its part of what the machine is told in every period.
     #[inline]
     fn take(&mut self, whole: &Setpoint) {
-        let (share, own) = (&self.share, &mut self.setpoint);
-        own.enable = whole.enable;
+        let own = &mut self.setpoint;
         own.tick = whole.tick;
-        own.outputs = share.outputs.to_own(whole.outputs);
+        // As many at once as are known when this is compiled: what the drives read of it joint by joint is at hand all the same.
+        match (self.joints.first, self.joints.count) {
+            (Some(first), 1) => return take_run::<1>(first, whole, own),
+            (Some(first), 2) => return take_run::<2>(first, whole, own),
+            (Some(first), 3) => return take_run::<3>(first, whole, own),
+            (Some(first), 4) => return take_run::<4>(first, whole, own),
+            _ => {}
+        }
         for (i, joint) in self.joints.iter() {
             own.position[i] = whole.position[joint];
             own.velocity[i] = whole.velocity[joint];
             own.acceleration[i] = whole.acceleration[joint];
         }
+    }
+
+    /// Takes what is the same in most periods.
+    fn take_orders(&mut self, whole: &Setpoint) {
+        let (share, own) = (&self.share, &mut self.setpoint);
+        own.enable = whole.enable;
+        own.outputs = share.outputs.to_own(whole.outputs);
         if share.spindle {
             own.spindle_rad_per_s = whole.spindle_rad_per_s;
         }
-    }
-
-    /// Takes what is zero in most periods.
-    fn take_orders(&mut self, whole: &Setpoint) {
-        let (share, own) = (&self.share, &mut self.setpoint);
         own.reset = whole.reset;
         own.homing = share.joints.to_own(u64::from(whole.homing)) as u32;
         own.limited = share.joints.to_own(u64::from(whole.limited)) as u32;
@@ -205,6 +220,37 @@ impl Part {
     }
 }
 
+/// What is the same in most periods of what a machine is told.
+#[derive(Default)]
+struct Orders {
+    enable: u32,
+    outputs: u64,
+    spindle_bits: u64,
+    /// What lasts for few periods, whatever it says.
+    passing: u32,
+}
+
+impl Orders {
+    #[inline]
+    fn of(setpoint: &Setpoint) -> Self {
+        Self {
+            enable: setpoint.enable,
+            outputs: setpoint.outputs,
+            spindle_bits: setpoint.spindle_rad_per_s.to_bits(),
+            passing: setpoint.reset | setpoint.homing | setpoint.limited | setpoint.arm.edge,
+        }
+    }
+
+    /// Whether the drivers are to be told: what passes is told in each of its periods, and once when it is over.
+    #[inline]
+    fn differ(&self, before: &Self) -> bool {
+        let changed = (self.outputs ^ before.outputs)
+            | (self.spindle_bits ^ before.spindle_bits)
+            | u64::from((self.enable ^ before.enable) | self.passing | before.passing);
+        changed != 0
+    }
+}
+
 /// Several drivers that each have a part of the machine, as the one that has all of it: it sends to all, then receives from all.
 ///
 /// Where one fails, the others go on being driven: the fine loop brings the machine to rest with them.
@@ -215,8 +261,8 @@ pub struct Composite {
     failed: Arc<AtomicUsize>,
     /// Some driver but the first begins its exchanges before those of others, as far as is known.
     any_sends: bool,
-    /// What the drivers were told last had orders ([`has_orders`]).
-    had_orders: bool,
+    /// What the drivers were told last of what is the same in most periods.
+    orders: Orders,
     /// How many latches were handed out last.
     latches: usize,
     /// Why an exchange of this period failed; not told yet.
@@ -238,7 +284,7 @@ impl Composite {
             description,
             failed,
             any_sends: true,
-            had_orders: false,
+            orders: Orders::default(),
             latches: 0,
             failure: None,
         }
@@ -250,8 +296,8 @@ impl Composite {
         for part in &mut self.parts {
             part.take(setpoint);
         }
-        let orders = has_orders(setpoint);
-        if orders | self.had_orders {
+        let orders = Orders::of(setpoint);
+        if orders.differ(&self.orders) {
             self.order_all(setpoint, orders);
         }
         if self.any_sends {
@@ -261,11 +307,11 @@ impl Composite {
 
     #[cold]
     #[inline(never)]
-    fn order_all(&mut self, setpoint: &Setpoint, orders: bool) {
+    fn order_all(&mut self, setpoint: &Setpoint, orders: Orders) {
         self.parts
             .iter_mut()
             .for_each(|part| part.take_orders(setpoint));
-        self.had_orders = orders;
+        self.orders = orders;
     }
 
     /// Begins the exchanges, so that the drivers wait for their answers together. That of the first comes next, and sends by
@@ -378,10 +424,13 @@ impl Driver for Composite {
     }
 }
 
-/// Whether some of what is zero in most periods is not.
+/// Takes what `N` joints are told that follow each other on the machine, from `first` on.
 #[inline]
-fn has_orders(setpoint: &Setpoint) -> bool {
-    setpoint.reset | setpoint.homing | setpoint.limited | setpoint.arm.edge != 0
+fn take_run<const N: usize>(first: usize, whole: &Setpoint, own: &mut Setpoint) {
+    let from = first.min(MAX_AXES - N);
+    own.position.0[..N].copy_from_slice(&whole.position.0[from..from + N]);
+    own.velocity.0[..N].copy_from_slice(&whole.velocity.0[from..from + N]);
+    own.acceleration.0[..N].copy_from_slice(&whole.acceleration.0[from..from + N]);
 }
 
 /// An answer whose refusal names the driver.

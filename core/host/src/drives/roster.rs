@@ -32,6 +32,8 @@ pub struct Roster {
     pub(super) failed: Arc<AtomicUsize>,
     /// What gives slow drivers their threads.
     pub(super) slow: Vec<Switch>,
+    /// Fine periods by which feedback is behind the command, of the joint where they are most; 0 until the drives are claimed.
+    pub delay_periods: u32,
 }
 
 impl Roster {
@@ -42,6 +44,16 @@ impl Roster {
             others,
             failed: Arc::default(),
             slow: vec![],
+            delay_periods: 0,
+        }
+    }
+
+    /// The same, told how far feedback is behind the command.
+    #[must_use]
+    pub fn behind_by(self, delay_periods: u32) -> Self {
+        Self {
+            delay_periods,
+            ..self
         }
     }
 

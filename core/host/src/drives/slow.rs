@@ -162,6 +162,7 @@ impl Switch {
     /// The computer gives no thread.
     pub fn begin(&self) -> std::io::Result<()> {
         let shared = Arc::clone(&self.0);
+        shared.ends.store(false, Release);
         let thread = thread::Builder::new()
             .name("tandem-slow".to_string())
             .spawn(move || shared.run())?;
@@ -228,6 +229,10 @@ impl Driver for Slow {
     }
 
     fn start(&mut self) -> Result<Attached, PluginError> {
+        // What was told and answered before a stop is of no use behind it.
+        let _ = (self.shared.message.pop(), self.shared.answered.pop());
+        (self.period, self.spindle_since, self.answered) = (0, 0, 0);
+        (self.last, self.feedback) = (Setpoint::default(), Feedback::default());
         self.driver()
             .map_or_else(|| Err(does_not_answer()), |mut driver| driver.start())
     }
@@ -259,6 +264,8 @@ impl Driver for Slow {
         if !self.shared.end() {
             return Err(does_not_answer());
         }
+        // Until its switch gives it another thread, it is called in line.
+        self.shared.has_thread.store(false, Release);
         self.driver()
             .map_or_else(|| Err(does_not_answer()), |mut driver| driver.stop())
     }

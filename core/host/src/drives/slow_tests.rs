@@ -193,3 +193,30 @@ fn a_device_that_does_not_come_back_is_not_waited_for() {
     assert_eq!(bench.slow.stop(), Err(does_not_answer()));
     assert!(bench.asked.try_recv().is_err(), "it is still in its call");
 }
+
+/// Behind a stop it is started once more, with a thread of its own again, and what was answered before counts no more.
+#[test]
+fn a_device_that_was_stopped_is_started_again_with_a_thread_of_its_own() {
+    let mut bench = Bench::new();
+    bench.exchange(0).unwrap();
+    assert_eq!(bench.asked.recv(), Ok(Asked::Exchange(1, 0)));
+    bench.answer(Ok(()));
+    bench.slow.stop().unwrap();
+    assert_eq!(bench.asked.recv(), Ok(Asked::Stop));
+    bench.slow.start().unwrap();
+    bench.slow.switch().begin().unwrap();
+    bench.feedback = Feedback::default();
+    bench.exchange(0).unwrap();
+    assert_eq!(
+        (bench.feedback.inputs, bench.feedback.input_age_periods[3]),
+        (0, 1),
+        "nothing was answered since"
+    );
+    // The exchange does not wait for the device, which was asked on its thread.
+    assert_eq!(bench.asked.recv(), Ok(Asked::Exchange(2, 0)));
+    bench.answer(Ok(()));
+    bench.exchange(0).unwrap();
+    assert_eq!(bench.feedback.inputs, 2);
+    drop(bench.answers);
+    bench.slow.stop().unwrap();
+}

@@ -32,6 +32,7 @@
 //! limits turn the direction. So there all entries go by one law, `v(t) = v₀·f(t)` once the acceleration has run out,
 //! which keeps every sum.
 
+pub mod apart;
 mod coupled;
 mod fold;
 mod joint;

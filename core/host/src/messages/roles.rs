@@ -43,7 +43,7 @@ fn mask(roles: &mut Roles, role: Role) -> &mut u64 {
         Role::Door => &mut roles.door,
         Role::FeedHold => &mut roles.feed_hold,
         Role::Limit => &mut roles.limit,
-        Role::Home | Role::Probe => &mut roles.awaited,
+        Role::Home | Role::Probe => &mut roles.home_or_probe,
     }
 }
 
@@ -54,7 +54,7 @@ pub fn fault_text(machine: &Machine, role: InputFault, input: u32, old: bool) ->
             InputFault::EmergencyStop => named.role == Some(Role::EmergencyStop),
             InputFault::DrivesReady => named.role == Some(Role::DrivesReady),
             InputFault::Limit => named.role == Some(Role::Limit),
-            InputFault::Awaited => matches!(named.role, Some(Role::Home | Role::Probe)),
+            InputFault::NotHeardOf => matches!(named.role, Some(Role::Home | Role::Probe)),
         };
         named.input == input && meant
     };
@@ -67,7 +67,7 @@ pub fn fault_text(machine: &Machine, role: InputFault, input: u32, old: bool) ->
         InputFault::EmergencyStop => "emergency stop",
         InputFault::DrivesReady => "the drives are not ready",
         InputFault::Limit => "a limit switch tripped in motion",
-        InputFault::Awaited => "the motion waits for a switch that is not heard of",
+        InputFault::NotHeardOf => "the motion waits for a switch that is not heard of",
     };
     if old {
         return format!(

@@ -83,9 +83,9 @@ impl HangWatch {
 
     /// Begins to watch this thread; `None` where the computer gives no thread to do so, which is no reason to stop.
     fn start(machine: &Machine, at_hang: AtHang) -> Option<Self> {
-        let lane = |most_s: f64| Lane {
+        let lane = |max_s: f64| Lane {
             place: Arc::default(),
-            most: Duration::from_secs_f64(most_s),
+            most: Duration::from_secs_f64(max_s),
         };
         let names = Names {
             planner: machine.planner.plugin.clone(),
@@ -240,7 +240,7 @@ impl Shared {
     }
 
     fn words(&self, method: Method, most: Duration) -> String {
-        let most_s = most.as_secs_f64();
+        let max_s = most.as_secs_f64();
         let machine = self.machine.lock().unwrap_or_else(PoisonError::into_inner);
         let at = machine.as_ref().map(|(_, status)| {
             format!(
@@ -253,7 +253,7 @@ impl Shared {
         if let Some((kind, call)) = method.words() {
             let name = self.names.of(kind);
             return format!(
-                "{} {name}: {call} does not come back: no answer for {most_s} s{at}",
+                "{} {name}: {call} does not come back: no answer for {max_s} s{at}",
                 kind.name()
             );
         }
@@ -263,7 +263,7 @@ impl Shared {
         } else {
             format!(", or kinematics {asked} that it asks,")
         };
-        format!("the fine loop{or} does not come back: no period for {most_s} s{at}")
+        format!("the fine loop{or} does not come back: no period for {max_s} s{at}")
     }
 
     /// Nothing new will be planned, but the fine loop still moves: it stops on the path.

@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::SystemTime;
 
+use tandem_gcode::Watched;
 use tandem_machine::Machine;
-use tandem_policy::{Engine, Period, Policy};
+use tandem_policy::{Engine, Parameter, Period, Policy};
 use tandem_recorder::PolicySummary;
 
 use super::setup::PolicySetup;
@@ -22,8 +23,8 @@ pub struct PolicyHost {
 }
 
 impl PolicyHost {
-    /// Compiles and starts the machine's script, if it names one.
-    pub fn open(machine: &Machine) -> Result<Option<Self>, HostError> {
+    /// Compiles and starts the machine's script, if it names one; the machine's feed strategy has `strategy_signals`.
+    pub fn open(machine: &Machine, strategy_signals: &[&str]) -> Result<Option<Self>, HostError> {
         let Some(choice) = &machine.policy else {
             return Ok(None);
         };
@@ -39,7 +40,7 @@ impl PolicyHost {
             budget,
             bounds,
             facts,
-        } = PolicySetup::of(machine)?;
+        } = PolicySetup::of(machine, strategy_signals)?;
         let policy = Policy::new(script, values, budget, bounds, &facts);
         let policy = policy.map_err(|e| match e {
             e @ tandem_policy::Refusal::Parameters(_) => {
@@ -55,9 +56,28 @@ impl PolicyHost {
         }))
     }
 
-    /// The ratio after a rough period; `None` where the script asks for none.
-    pub fn period(&self, period: &Period) -> Option<f64> {
-        self.lock().period(period)
+    /// The parameters that the script declares. Allocates.
+    pub fn declared(&self) -> Vec<Parameter> {
+        self.lock().declared()
+    }
+
+    /// The ratio after a rough period, of which `means` makes what the script looks at; `None` where it asks for none.
+    pub fn period(&self, means: impl FnOnce(&Policy) -> Period) -> Option<f64> {
+        let mut policy = self.lock();
+        let period = means(&policy);
+        policy.period(&period)
+    }
+
+    /// What the interpreter is to watch for in the program.
+    pub fn watched(&self) -> Vec<Watched> {
+        let policy = self.lock();
+        let inputs = policy.program_inputs().iter();
+        inputs
+            .map(|input| Watched {
+                name: input.name.clone(),
+                words: input.words.clone(),
+            })
+            .collect()
     }
 
     /// What the script did, for the observer; the rest of a run's notes is in [`Self::summary`].
@@ -93,8 +113,8 @@ impl PolicyHost {
             quarantined: policy.is_quarantined(),
             reloads: counters.reloads,
             refused_reloads: counters.refused_reloads,
-            most_window_fuel: counters.most_window_fuel,
-            most_period_fuel: counters.most_period_fuel,
+            max_window_fuel: counters.max_window_fuel,
+            max_period_fuel: counters.max_period_fuel,
         }
     }
 

@@ -8,7 +8,7 @@ mod setup;
 mod tuner;
 
 pub use host::PolicyHost;
-pub use means::Means;
+pub use means::{Looks, Means};
 pub use reload::Reloader;
 pub use setup::PolicySetup;
 pub use tuner::Tuner;

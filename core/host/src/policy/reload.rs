@@ -149,7 +149,7 @@ mod tests {
         let mill =
             Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-3axis.toml");
         let set = ("policy.script".to_string(), file.display().to_string());
-        let host = PolicyHost::open(&Machine::read(&mill, &[set]).unwrap())
+        let host = PolicyHost::open(&Machine::read(&mill, &[set]).unwrap(), &[])
             .unwrap()
             .unwrap();
         let mut reloader = Reloader::new(host.clone());

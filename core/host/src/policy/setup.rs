@@ -1,14 +1,13 @@
 //! What the machine file says of its policy script.
 
-use tandem_machine::{Machine, Policy};
+use tandem_machine::{Analog, Machine, Policy};
 use tandem_policy::{Bounds, Budget, Facts, Values};
-use tandem_sdk::Axes;
 use toml::Value;
 
 use crate::error::{HostError, refusal};
 
 /// Parameters, budget, bounds and what the script is told of the machine.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct PolicySetup {
     /// Parameters by name.
     pub values: Values,
@@ -21,16 +20,18 @@ pub struct PolicySetup {
 }
 
 impl PolicySetup {
-    /// As `machine` states it, or by default.
+    /// As `machine` states it, or by default; its feed strategy has `strategy_signals`.
     ///
     /// # Errors
     /// A parameter is not a number, with its place.
-    pub fn of(machine: &Machine) -> Result<Self, HostError> {
+    pub fn of(machine: &Machine, strategy_signals: &[&str]) -> Result<Self, HostError> {
         let facts = Facts {
             axes: machine.axes,
             time_constant_s: machine.motion.time_constant_s,
             path_tolerance_mm: machine.motion.path_tolerance_mm,
             rough_period_s: machine.rough_period_s,
+            tool_diameters_mm: diameters(machine),
+            signals: signals(machine, strategy_signals),
         };
         let bounds = Bounds {
             max_feed_ratio: machine.motion.max_feed_ratio,
@@ -54,23 +55,21 @@ impl PolicySetup {
     }
 }
 
-impl Default for PolicySetup {
-    fn default() -> Self {
-        let axes = Axes::new(&[('X', false), ('Y', false), ('Z', false)])
-            .unwrap_or_else(|e| unreachable!("{e}"));
-        let facts = Facts {
-            axes,
-            time_constant_s: 0.05,
-            path_tolerance_mm: 0.01,
-            rough_period_s: 0.008,
-        };
-        Self {
-            values: vec![],
-            budget: Budget::default(),
-            bounds: Bounds::default(),
-            facts,
-        }
-    }
+/// The tools of the table that have a diameter.
+fn diameters(machine: &Machine) -> Vec<(u32, f64)> {
+    let tools = machine.tools.tools.iter();
+    tools
+        .filter(|tool| tool.diameter_mm > 0.0)
+        .map(|tool| (tool.number, tool.diameter_mm))
+        .collect()
+}
+
+/// Names of what a script can ask for, as [`super::Means`] gives it: signals of the strategy, analog and digital inputs.
+pub fn signals(machine: &Machine, strategy_signals: &[&str]) -> Vec<String> {
+    let own = strategy_signals.iter().map(|name| (*name).to_string());
+    let analog = machine.analog.iter().map(Analog::signal);
+    let inputs = machine.inputs.iter().map(|input| input.name.clone());
+    own.chain(analog).chain(inputs).collect()
 }
 
 /// The parameters of the machine file as numbers; true and false are 1 and 0.

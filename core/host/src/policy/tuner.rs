@@ -19,6 +19,10 @@ impl Tuner {
 }
 
 impl BlockPolicy for Tuner {
+    fn state(&mut self, which: usize, value: f64) {
+        self.host.lock().state(which, value);
+    }
+
     fn offer(&mut self, block: &Block, curve: Option<Curve<'_>>) {
         self.host.lock().offer(block, curve);
     }

@@ -1,5 +1,6 @@
 //! A machine that stays: its drives are attached once, and driven by one job after the other.
 
+mod claimed;
 mod engine;
 
 use std::collections::BTreeMap;
@@ -8,27 +9,34 @@ use std::sync::atomic::Ordering::Relaxed;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use tandem_fine::{Fault, FaultKind, FineLoop, Left};
+use tandem_fine::{Fault, FineLoop, Left};
 use tandem_gcode::{CheckReport, Program};
 use tandem_machine::Machine;
+use tandem_policy::Parameter as PolicyParameter;
 use tandem_recorder::Summary;
-use tandem_rings::{Controls, Rest, Status};
+use tandem_rings::{Controls, Status};
 use tandem_rough::Source;
-use tandem_sdk::{Attached, AxisVector, Block, Curve};
+use tandem_sdk::{
+    Attached, AxisVector, Block, Curve, Driver, DriverContext, DriverDescription, Feedback,
+    PluginError, Setpoint,
+};
 
-use crate::clock::exchange_time::{self, ExchangeTimes};
 use crate::drives::Roster;
 use crate::error::HostError;
+use crate::joints::JointSpace;
+use crate::joints::apart::{Apart, Joined};
 use crate::plugins::hang::HangWatch;
 use crate::plugins::plugin_log::drain_plugin_log;
 use crate::plugins::registry::Registry;
 use crate::policy::PolicyHost;
 use crate::run::job::{Conclusion, Job, Made};
-use crate::run::{begin, periods};
+use crate::run::periods;
 use crate::setup::commands::with_user_commands;
-use crate::setup::ready::{Memory, Plugins, Ready};
+use crate::setup::parts;
+use crate::setup::ready::{Memory, Ready};
 use crate::soft::soft_loop::{RunObserver, SoftLoop};
 use crate::switches::{Clock, Lead, Switches};
+use claimed::{Claimed, Gone, Nothing, Session, gone};
 use engine::Engine;
 
 /// Machine time, s, without any passing of program time after which a job to which nobody can say anything any more is given
@@ -53,103 +61,18 @@ pub struct Resident<'r> {
     uptime_periods: u64,
     /// The drives hold between jobs.
     enabled: bool,
-    /// The driver does not reach its drives any more: they are to be claimed anew.
-    lost: bool,
-}
-
-/// Drives that are claimed, none of them enabled, and the loop at them that has nothing to do.
-struct Claimed {
-    /// It stands where the drives are.
-    machine: Machine,
-    roster: Roster,
-    attached: Attached,
-    watch: Option<HangWatch>,
-    /// Bit per axis of which it is not known where it is.
-    unknown_axes: u32,
-    fine: Box<FineLoop>,
-}
-
-impl Claimed {
-    fn of(
-        machine: Machine,
-        registry: &Registry,
-        clock: Clock,
-        (controls, status): (&Arc<Controls>, &Arc<Status>),
-    ) -> Result<Self, HostError> {
-        let switches = Switches {
-            clock: Some(clock),
-            unhomed: true,
-            reset: true,
-            ..Switches::default()
-        };
-        let mut plugins = Plugins::of(&machine, registry)?;
-        plugins.check_staying(&machine, switches)?;
-        plugins.add_faults(&machine)?;
-        let (machine, plugins) = plugins.attach(machine, registry, switches)?;
-        let roster = plugins.claim.roster();
-        begin(&machine, &roster, clock)?;
-        let watch = plugins.watch;
-        let Some((driver, attached)) = plugins.claim.into_parts() else {
-            return Err(HostError::System("the drives are not claimed".to_string()));
-        };
-        let mut unknown_axes = plugins
-            .joints
-            .axes_moved_by(!(attached.known | attached.homed));
-        if machine.require_homing {
-            // As for a run: whatever the drives say, the machine file asks for it once each time that they are claimed.
-            unknown_axes |= machine
-                .homing
-                .iter()
-                .fold(0, |axes, of| axes | 1 << of.axis);
-        }
-        if let Some(watch) = &watch {
-            watch.begin(Arc::clone(controls), Arc::clone(status));
-        }
-        let ready = Ready::of_source_on(
-            &roster,
-            machine.clone(),
-            registry,
-            None,
-            |_| Box::new(Nothing),
-            switches,
-        )?;
-        let shared = (Arc::clone(controls), Arc::clone(status));
-        let made = Made::of(ready, &attached, clock == Clock::Wall, shared);
-        // How long exchanges take is measured of runs alone.
-        let exchange = Arc::<ExchangeTimes>::default();
-        let driver = Box::new(exchange_time::Timed::new(
-            driver,
-            machine.fine_period_s,
-            exchange,
-        ));
-        let mut fine = Box::new(FineLoop::new(
-            &made.config,
-            made.end,
-            driver,
-            made.kinematics,
-        ));
-        fine.stay();
-        fine.begin_ended();
-        Ok(Self {
-            machine,
-            roster,
-            attached,
-            watch,
-            unknown_axes,
-            fine,
-        })
-    }
-}
-
-/// Whether behind this fault the driver itself is gone, or what it drives.
-fn is_lost(fault: &Fault) -> bool {
-    matches!(fault.kind, FaultKind::Driver | FaultKind::Lost { .. })
+    /// What is to be brought back before the drives can be enabled.
+    lost: Option<Gone>,
+    /// The driver between a fault and the start by which it finds its drives again.
+    stopped: Option<Box<dyn Driver>>,
 }
 
 /// A job that is ready to be driven; nothing has moved.
 pub struct PreparedJob {
     made: Box<Made>,
     homes: u32,
+    /// The gantries are apart meanwhile.
+    apart: Option<Box<Apart>>,
 }
 
 /// What a job did.
@@ -184,21 +107,6 @@ impl PreparedJob {
     }
 }
 
-/// The source of the job that enables: nothing but the rest at which all joints hold.
-struct Nothing;
-
-impl Source for Nothing {
-    fn next_items(&mut self, _items: &mut Vec<tandem_gcode::Item>) -> Result<bool, String> {
-        Ok(false)
-    }
-
-    fn provide_input(&mut self, _value: f64) {}
-
-    fn provide_rest(&mut self, _rest: &Rest) -> bool {
-        true
-    }
-}
-
 impl<'r> Resident<'r> {
     /// Claims the drives of `machine`; none is enabled. Host; allocates.
     ///
@@ -210,7 +118,13 @@ impl<'r> Resident<'r> {
         clock: Clock,
     ) -> Result<Self, HostError> {
         let (controls, status) = (Arc::<Controls>::default(), Arc::<Status>::default());
-        let claimed = Claimed::of(machine, registry, clock, (&controls, &status))?;
+        let session = Session {
+            registry,
+            clock,
+            controls: &controls,
+            status: &status,
+        };
+        let claimed = Claimed::of(machine, &session)?;
         let mut this = Self {
             engine: Engine::Down(None),
             machine: claimed.machine,
@@ -224,34 +138,48 @@ impl<'r> Resident<'r> {
             unknown_axes: claimed.unknown_axes,
             uptime_periods: 0,
             enabled: false,
-            lost: false,
+            lost: None,
+            stopped: None,
         };
         this.engine = this.engine_of(claimed.fine, true)?;
         Ok(this)
     }
 
-    /// Claims drives once more that a driver has lost: the bus is brought up as at the start, and asked where everything stands.
-    /// What it was before is let go of first. Host; allocates.
+    /// Finds drives again that a driver has lost, by the same driver: the bus is brought up as at the start, and asked where
+    /// everything stands. Where the driver itself could not go on, another one claims the drives. Host; allocates.
     ///
     /// # Errors
     /// The drives cannot be reached: nothing is claimed, and it can be tried again.
-    fn attach_again(&mut self) -> Result<(), HostError> {
+    fn attach_again(&mut self, gone: Gone) -> Result<(), HostError> {
         self.uptime_periods += self.engine.periods();
         let engine = std::mem::replace(&mut self.engine, Engine::Down(None));
         if let Some(fine) = engine.end()? {
+            let mut driver = fine.into_driver();
             // Whether that lets go of what it does not reach says nothing.
-            let _ = fine.into_driver().stop();
+            let _ = driver.stop();
+            self.stopped = Some(driver);
         }
-        self.watch = None;
-        let shared = (&self.controls, &self.status);
-        let claimed = Claimed::of(self.machine.clone(), self.registry, self.clock, shared)?;
+        let machine = self.machine.clone();
+        let session = Session {
+            registry: self.registry,
+            clock: self.clock,
+            controls: &self.controls,
+            status: &self.status,
+        };
+        let claimed = if gone == Gone::Drives && self.stopped.is_some() {
+            Claimed::again(machine, &session, self.roster.clone(), &mut self.stopped)?
+        } else {
+            (self.stopped, self.watch) = (None, None);
+            let mut claimed = Claimed::of(machine, &session)?;
+            self.watch = claimed.watch.take();
+            claimed
+        };
         self.machine = claimed.machine;
         self.roster = claimed.roster;
         self.attached = claimed.attached;
         self.unknown_axes = claimed.unknown_axes;
-        self.watch = claimed.watch;
         self.engine = self.engine_of(claimed.fine, true)?;
-        self.lost = false;
+        self.lost = None;
         Ok(())
     }
 
@@ -275,6 +203,12 @@ impl<'r> Resident<'r> {
     /// Whether all drives are simulated.
     pub fn is_simulated(&self) -> bool {
         self.roster.describe().simulated != 0
+    }
+
+    /// Whether there are drives behind a bus, real ones or an emulator's, that may be heard late.
+    pub fn has_bus(&self) -> bool {
+        let all = self.roster.describe();
+        all.simulated == 0 || all.gives_phase != 0
     }
 
     /// The operator's atomics, the same for all jobs.
@@ -313,6 +247,15 @@ impl<'r> Resident<'r> {
         policy.map_or_else(BTreeMap::new, |policy| policy.numbers().collect())
     }
 
+    /// The parameters that the policy script declares, with their bounds; none without a script. Starts it to ask. Allocates.
+    ///
+    /// # Errors
+    /// The script does not start.
+    pub fn declared_parameters(&self) -> Result<Vec<PolicyParameter>, HostError> {
+        let policy = self.policy_of(&self.machine)?;
+        Ok(policy.map_or(vec![], |policy| policy.declared()))
+    }
+
     /// The next job has `value` for the parameter `name` of the policy script. Allocates.
     ///
     /// # Errors
@@ -325,9 +268,15 @@ impl<'r> Resident<'r> {
             ));
         };
         policy.set_number(name, value);
-        PolicyHost::open(&machine)?;
+        self.policy_of(&machine)?;
         self.machine = machine;
         Ok(())
+    }
+
+    /// The policy script of `machine`, started, where it has one.
+    fn policy_of(&self, machine: &Machine) -> Result<Option<PolicyHost>, HostError> {
+        let joints = JointSpace::of(machine, self.registry)?;
+        parts::policy(machine, self.registry, &joints)
     }
 
     /// Checks a program from where the machine stands, with what has lasted, and makes the job that drives it. Every block goes to
@@ -397,12 +346,19 @@ impl<'r> Resident<'r> {
             .homing
             .iter()
             .fold(0, |axes, of| axes | 1 << of.axis);
+        let apart = Apart::of(&machine, self.registry)?;
+        if let Some(apart) = &apart {
+            machine = apart.machine.clone();
+        }
         let (name, make) = (Some("homing".to_string()), |machine: &Machine| {
             homing(machine, None)
         });
         let ready =
             Ready::of_source_on(&self.roster, machine, self.registry, name, make, switches)?;
-        Ok(self.prepared(ready, homes))
+        Ok(PreparedJob {
+            apart: apart.map(Box::new),
+            ..self.prepared(ready, homes)
+        })
     }
 
     fn on_clock(&self, switches: Switches) -> Switches {
@@ -418,6 +374,7 @@ impl<'r> Resident<'r> {
         PreparedJob {
             made: Box::new(made),
             homes,
+            apart: None,
         }
     }
 
@@ -435,8 +392,8 @@ impl<'r> Resident<'r> {
             unhomed: true,
             ..Switches::default()
         };
-        if resets && self.lost {
-            self.attach_again()?;
+        if let Some(gone) = self.lost.filter(|_| resets) {
+            self.attach_again(gone)?;
         }
         let job = self.source("enabling", Box::new(Nothing), switches)?;
         self.controls.let_go.store(false, Relaxed);
@@ -465,7 +422,7 @@ impl<'r> Resident<'r> {
         observer: &mut dyn RunObserver,
     ) -> Result<JobOutcome, HostError> {
         let started = Instant::now();
-        let PreparedJob { made, homes } = job;
+        let PreparedJob { made, homes, apart } = job;
         let Made {
             job,
             config,
@@ -484,14 +441,28 @@ impl<'r> Resident<'r> {
             };
             self.engine = self.engine_of(fine, false)?;
         }
-        let (mut soft_loop, conclusion) = job.begin(self.clock, observer);
+        let mut joined;
+        let seen: &mut dyn RunObserver = match apart.as_deref() {
+            Some(apart) => {
+                joined = Joined {
+                    observer: &mut *observer,
+                    apart,
+                };
+                &mut joined
+            }
+            None => &mut *observer,
+        };
+        let (mut soft_loop, conclusion) = job.begin(self.clock, seen);
         let end = match self.clock {
             Clock::Virtual => self.in_lockstep(&mut soft_loop)?,
             Clock::Wall => self.in_real_time(&mut soft_loop)?,
         };
         soft_loop.drain();
         soft_loop.take_rests();
-        let outcome = self.conclude(end, &mut soft_loop, &conclusion, started);
+        let mut outcome = self.conclude(end, &mut soft_loop, &conclusion, started);
+        if let Some(apart) = &apart {
+            outcome.position = apart.joined(&outcome.position);
+        }
         drop(soft_loop);
         drain_plugin_log(&mut |line| observer.note(line));
         self.clear_controls();
@@ -500,7 +471,9 @@ impl<'r> Resident<'r> {
             self.unknown_axes &= !homes;
         }
         self.enabled &= outcome.fault.is_none();
-        self.lost |= outcome.fault.as_ref().is_some_and(is_lost);
+        if let Engine::Down(Some(fine)) = &self.engine {
+            self.lost = gone(fine).or(self.lost);
+        }
         Ok(outcome)
     }
 
@@ -515,7 +488,7 @@ impl<'r> Resident<'r> {
         ] {
             flag.store(false, Relaxed);
         }
-        controls.jog.most_periods.store(0, Relaxed);
+        controls.jog.max_periods.store(0, Relaxed);
         controls.jog.let_go.store(false, Relaxed);
     }
 
@@ -640,7 +613,8 @@ impl<'r> Resident<'r> {
         let Some(fault) = fine.fault() else {
             return Ok(None);
         };
-        let joints = crate::joints::JointSpace::of(machine, self.registry)?;
+        let joints = JointSpace::of(machine, self.registry)?;
+        self.lost = gone(fine).or(self.lost);
         let known = crate::messages::fault_text::Known {
             soft: None,
             driver: fine.plugin_error(),
@@ -651,7 +625,6 @@ impl<'r> Resident<'r> {
         let words = crate::messages::fault_text::describe(machine, &joints, &fault, known);
         self.uptime_periods += before;
         self.enabled = false;
-        self.lost |= is_lost(&fault);
         self.clear_controls();
         Ok(Some(words))
     }
@@ -693,33 +666,30 @@ impl<'r> Resident<'r> {
 /// Stands in a loop until it takes over the drives.
 struct NoDriver;
 
-impl tandem_sdk::Driver for NoDriver {
-    fn describe(&self) -> tandem_sdk::DriverDescription {
-        tandem_sdk::DriverDescription::simulated()
+impl Driver for NoDriver {
+    fn describe(&self) -> DriverDescription {
+        DriverDescription::simulated()
     }
 
-    fn open(
-        &mut self,
-        _context: &tandem_sdk::DriverContext,
-    ) -> Result<(), tandem_sdk::PluginError> {
+    fn open(&mut self, _context: &DriverContext) -> Result<(), PluginError> {
         Ok(())
     }
 
-    fn start(&mut self) -> Result<Attached, tandem_sdk::PluginError> {
+    fn start(&mut self) -> Result<Attached, PluginError> {
         Ok(Attached::default())
     }
 
     fn exchange(
         &mut self,
-        _setpoint: &tandem_sdk::Setpoint,
-        _feedback: &mut tandem_sdk::Feedback,
-    ) -> Result<(), tandem_sdk::PluginError> {
+        _setpoint: &Setpoint,
+        _feedback: &mut Feedback,
+    ) -> Result<(), PluginError> {
         Ok(())
     }
 
     fn quick_stop(&mut self) {}
 
-    fn stop(&mut self) -> Result<(), tandem_sdk::PluginError> {
+    fn stop(&mut self) -> Result<(), PluginError> {
         Ok(())
     }
 }

@@ -4,11 +4,11 @@
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 
-use tandem_fine::{Counters, Fault, FineConfig, FineLoop};
+use tandem_fine::{Fault, FineConfig, FineLoop};
 use tandem_gcode::CheckReport;
 use tandem_machine::{Analog, Machine};
 use tandem_recorder::{Monitor, Summary};
-use tandem_rings::{Controls, FineEnd, HostEnd, Sizes, Status, bridge_with};
+use tandem_rings::{Controls, Counters, FineEnd, HostEnd, Sizes, Status, bridge_with};
 use tandem_rough::{RoughConfig, RoughLoop};
 use tandem_sdk::{Attached, Kinematics, MAX_AXES};
 
@@ -98,6 +98,7 @@ impl Made {
             switches,
         );
         config.record_drives = ready.records_drives;
+        config.strategy_takes_override = feed.as_ref().is_some_and(FeedRunner::takes_override);
         host.status
             .hexadecimal_codes
             .store(drives.hexadecimal_codes != 0, Relaxed);

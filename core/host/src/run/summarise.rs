@@ -2,9 +2,9 @@
 
 use std::sync::atomic::Ordering::Relaxed;
 
-use tandem_fine::Counters;
 use tandem_machine::{JerkMode, Machine};
 use tandem_recorder::{JointWatch, PlanningUs, SUMMARY_FORMAT, Summary};
+use tandem_rings::Counters;
 use tandem_sdk::AxisVector;
 
 use crate::soft::soft_loop::SoftLoop;

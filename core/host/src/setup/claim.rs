@@ -2,7 +2,9 @@
 
 use tandem_faults::Faults;
 use tandem_machine::Machine;
-use tandem_sdk::{Attached, AxisVector, Driver, DriverDescription, JointState, MAX_DELAY_PERIODS};
+use tandem_sdk::{
+    Attached, AxisVector, Driver, DriverDescription, JointState, MAX_DELAY_PERIODS, Words,
+};
 
 use crate::drives::{Drives, Roster};
 use crate::error::{HostError, refusal};
@@ -52,7 +54,18 @@ impl Claim {
                 .clone()
                 .unwrap_or_else(|| Roster::of_one(DriverDescription::real()))
         };
-        self.drives.as_ref().map_or_else(elsewhere, Drives::roster)
+        let roster = self.drives.as_ref().map_or_else(elsewhere, Drives::roster);
+        match &self.attached {
+            Some(attached) => {
+                roster.behind_by(attached.delay_periods.into_iter().max().unwrap_or(0))
+            }
+            None => roster,
+        }
+    }
+
+    /// Fine periods by which feedback is behind the command, of the joint where they are most; 0 until the drives are claimed.
+    pub fn delay_periods(&self) -> u32 {
+        self.roster().delay_periods
     }
 
     /// What the drivers together say of themselves.
@@ -97,14 +110,10 @@ impl Claim {
             machine,
             joints,
             attached: &attached,
-            drives,
+            explain: &|joint, code| drives.explain(joint, code),
             roster: drives.roster(),
         };
-        look.at_numbers()?;
-        look.at_states(switches.reset)?;
-        look.at_skew()?;
-        look.at_known(switches)?;
-        Ok(look.axes())
+        look.at_all(switches)
     }
 
     /// The driver for the fine loop, and what the drives said.
@@ -127,16 +136,48 @@ impl Drop for Claim {
     }
 }
 
+/// Where the axes stand, mm or rad, by what a `driver` said that has brought its bus up once more. Host; allocates.
+///
+/// # Errors
+/// What it says makes no sense, or a drive cannot be reached.
+pub fn stands(
+    machine: &Machine,
+    joints: &JointSpace,
+    roster: &Roster,
+    driver: &dyn Driver,
+    attached: &Attached,
+    switches: Switches,
+) -> Result<AxisVector, HostError> {
+    let look = Look {
+        machine,
+        joints,
+        attached,
+        explain: &|joint, code| driver.explain(joint as u32, code),
+        roster: roster.clone(),
+    };
+    look.at_all(switches)
+}
+
 /// Looks at what the drivers say of the joints.
 struct Look<'a> {
     machine: &'a Machine,
     joints: &'a JointSpace,
     attached: &'a Attached,
-    drives: &'a Drives,
+    /// What a code of the drive of a joint means.
+    explain: &'a dyn Fn(usize, u32) -> Words,
     roster: Roster,
 }
 
 impl Look<'_> {
+    /// Where the axes stand, where nothing is wrong with what is said.
+    fn at_all(&self, switches: Switches) -> Result<AxisVector, HostError> {
+        self.at_numbers()?;
+        self.at_states(switches.reset)?;
+        self.at_skew()?;
+        self.at_known(switches)?;
+        Ok(self.axes())
+    }
+
     /// What is wrong with the joints that `which` says: `cause` makes a sentence of their names, for the driver of the first.
     fn refuse(
         &self,
@@ -197,7 +238,7 @@ impl Look<'_> {
                 let joint = faulty.unwrap_or_default();
                 let hexadecimal = self.roster.of_joint(joint).description.hexadecimal_codes != 0;
                 let code = self.attached.fault_code[joint];
-                let code = code_text(hexadecimal, code, &self.drives.explain(joint, code));
+                let code = code_text(hexadecimal, code, &(self.explain)(joint, code));
                 format!("the drive of {name} stands in fault {code}; --reset clears it")
             },
         )

@@ -133,6 +133,11 @@ impl Source for Commands {
         }
     }
 
+    fn streams(&self) -> bool {
+        // In front of a command the machine comes to rest at once.
+        matches!(self.state, State::Idle) && self.source.streams()
+    }
+
     fn period(&mut self) {
         self.source.period();
     }

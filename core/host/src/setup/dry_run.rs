@@ -51,6 +51,22 @@ impl<S: Source> Source for DryRun<S> {
         Ok(more)
     }
 
+    fn may_go_on(&mut self, driven: bool) -> bool {
+        self.source.may_go_on(driven)
+    }
+
+    fn streams(&self) -> bool {
+        self.source.streams()
+    }
+
+    fn period(&mut self) {
+        self.source.period();
+    }
+
+    fn is_waiting(&self) -> bool {
+        self.source.is_waiting()
+    }
+
     fn provide_input(&mut self, value: f64) {
         self.source.provide_input(value);
     }

@@ -2,16 +2,17 @@
 
 use std::sync::Arc;
 
-use tandem_fine::{FineConfig, MissedLimits};
+use tandem_fine::{FineConfig, HomeSwitch, MissedLimits};
 use tandem_gcode::{Config, Lines, ProbeInput, Stream, Tool};
 use tandem_machine::{GuardMode, Machine};
 use tandem_rings::{STOP_JERK_SHARE, STOP_SHARE};
 use tandem_rough::{Source, Tuned};
 use tandem_sdk::{
-    Attached, AxisLimits, AxisVector, DriverDescription, FeedStrategy, Limits, Planner,
-    PlannerContext, PlannerDescription, StrategyContext,
+    Attached, AxisLimits, AxisVector, DriverDescription, FeedStrategy, Limits, MAX_AXES, Name,
+    Planner, PlannerContext, PlannerDescription, StrategyContext,
 };
 
+use crate::drives::driver_context;
 use crate::error::HostError;
 use crate::joints::{CoupledJoints, JointSpace};
 use crate::messages::roles;
@@ -103,16 +104,24 @@ pub fn behind_homing(
     }
 }
 
-/// The program as the rough loop pulls it: in a dry run, at the machine's dry-run feed where it states one.
+/// The program as the rough loop pulls it.
 fn program(machine: &Machine, stream: Stream, switches: Switches) -> Box<dyn Source + Send> {
-    match machine
-        .operator
-        .dry_run_feed_mm_per_s
-        .filter(|_| switches.dry_run)
-    {
-        Some(feed_mm_per_s) => Box::new(DryRun::new(stream, machine.axes, feed_mm_per_s)),
-        None if switches.assumes_edges => Box::new(AssumedEdges(stream)),
-        None => Box::new(stream),
+    if switches.assumes_edges {
+        return as_dry_run(machine, switches, Box::new(AssumedEdges(stream)));
+    }
+    as_dry_run(machine, switches, Box::new(stream))
+}
+
+/// `source`, in a dry run at the machine's dry-run feed where it states one. Host; allocates.
+pub fn as_dry_run(
+    machine: &Machine,
+    switches: Switches,
+    source: Box<dyn Source + Send>,
+) -> Box<dyn Source + Send> {
+    let feed_mm_per_s = machine.operator.dry_run_feed_mm_per_s;
+    match feed_mm_per_s.filter(|_| switches.dry_run) {
+        Some(feed_mm_per_s) => Box::new(DryRun::new(source, machine.axes, feed_mm_per_s)),
+        None => source,
     }
 }
 
@@ -170,27 +179,23 @@ pub fn axis_limits(machine: &Machine, registry: &Registry) -> Result<Limits, Hos
     Ok(JointSpace::of(machine, registry)?.of_axes())
 }
 
-/// What asks feed strategy and policy once a rough period, where there is either. The program is `length_mm` long.
+/// What asks feed strategy and policy once a rough period, where there is either. The program is `length_mm` long; feedback is
+/// `delay_periods` behind the command.
 pub fn feed(
     machine: &Machine,
     registry: &Registry,
-    joints: &JointSpace,
+    (joints, delay_periods): (&JointSpace, u32),
     policy: Option<&PolicyHost>,
     length_mm: f64,
 ) -> Result<Option<FeedRunner>, HostError> {
-    let strategy = strategy(machine, registry, joints)?;
+    let strategy = strategy(machine, registry, joints, delay_periods)?;
     if strategy.is_none() && policy.is_none() {
         return Ok(None);
     }
     let signals = strategy
         .as_ref()
         .map_or::<&[&str], _>(&[], |strategy| strategy.signals());
-    let policy = policy.map(|p| {
-        (
-            p.clone(),
-            Means::new(machine.axes, machine.fine_period_s, length_mm, signals),
-        )
-    });
+    let policy = policy.map(|p| (p.clone(), Means::new(machine, length_mm, signals)));
     let per_window = machine.fine_periods_per_rough as usize;
     let mut runner = FeedRunner::new(strategy, policy, per_window, machine.motion.max_feed_ratio);
     runner.name = machine
@@ -201,23 +206,71 @@ pub fn feed(
     Ok(Some(runner))
 }
 
+/// Opens the machine's policy script, if it names one. Host; allocates.
+///
+/// # Errors
+/// The script is refused, or the strategy whose signals it may see.
+pub fn policy(
+    machine: &Machine,
+    registry: &Registry,
+    joints: &JointSpace,
+) -> Result<Option<PolicyHost>, HostError> {
+    if machine.policy.is_none() {
+        return Ok(None);
+    }
+    PolicyHost::open(machine, strategy_signals_on(machine, registry, joints)?)
+}
+
+/// Names of the signals of the machine's feed strategy; none without one. Host; allocates.
+///
+/// # Errors
+/// The strategy is refused, or the joints are.
+pub fn strategy_signals(
+    machine: &Machine,
+    registry: &Registry,
+) -> Result<&'static [&'static str], HostError> {
+    strategy_signals_on(machine, registry, &JointSpace::of(machine, registry)?)
+}
+
+fn strategy_signals_on(
+    machine: &Machine,
+    registry: &Registry,
+    joints: &JointSpace,
+) -> Result<&'static [&'static str], HostError> {
+    let strategy = strategy(machine, registry, joints, 0)?;
+    Ok(strategy.map_or(&[], |strategy| strategy.signals()))
+}
+
 /// Makes the machine's feed strategy, if it names one.
 fn strategy(
     machine: &Machine,
     registry: &Registry,
     joints: &JointSpace,
+    delay_periods: u32,
 ) -> Result<Option<Box<dyn FeedStrategy>>, HostError> {
     let Some(choice) = &machine.feed_strategy else {
         return Ok(None);
     };
-    let context = StrategyContext {
-        axis_count: machine.axes.count() as u32,
-        axes: machine.axes,
-        fine_period_s: machine.fine_period_s,
-        rough_period_s: machine.rough_period_s,
-        max_feed_ratio: machine.motion.max_feed_ratio,
+    let driven = driver_context(machine, joints);
+    let mut context = StrategyContext {
         joints_are_axes: u32::from(joints.are_axes()),
+        joint_count: driven.joint_count,
+        limits: joints.of_axes(),
+        joints: driven.joints,
+        delay_periods,
+        ..StrategyContext::new(
+            machine.axes,
+            machine.fine_period_s,
+            machine.rough_period_s,
+            machine.motion.max_feed_ratio,
+        )
     };
+    for analog in &machine.analog {
+        context.analog[analog.input as usize] = Name::new(&analog.name);
+    }
+    for input in &machine.inputs {
+        context.inputs[input.input as usize] = Name::new(&input.name);
+    }
     let made = registry.strategy(choice, &context);
     made.map(Some).map_err(|e| e.at(machine, "feed_strategy"))
 }
@@ -257,6 +310,20 @@ pub fn advance_s(rough_period_s: f64, depth_s: f64, segments: usize) -> f64 {
             .max(1.0)
 }
 
+/// The home switch of each axis that has one.
+fn home_switches(machine: &Machine) -> [HomeSwitch; MAX_AXES] {
+    let mut all = [HomeSwitch::default(); MAX_AXES];
+    for homing in &machine.homing {
+        if let Some(switch) = homing.switch() {
+            all[homing.axis] = HomeSwitch {
+                input: switch.input,
+                inverted: switch.inverted,
+            };
+        }
+    }
+    all
+}
+
 /// The fine loop's view of the machine.
 pub fn fine_config(
     machine: &Machine,
@@ -285,6 +352,8 @@ pub fn fine_config(
         },
         position: joints.with_lanes(&machine.start),
         max_feed_ratio: machine.motion.max_feed_ratio,
+        ratio_periods: machine.fine_periods_per_rough,
+        strategy_takes_override: false,
         max_following_error_mm: joints.max_following_error_mm(),
         missed: MissedLimits {
             in_a_row: u64::from(machine.max_missed_periods),
@@ -302,6 +371,7 @@ pub fn fine_config(
             0
         },
         homing_limits: limited.fold(0, |mask, homing| mask | 1 << homing.axis),
+        home_switches: home_switches(machine),
         record_drives: false,
         attached: *attached,
         enable_periods: periods(driver.enable_s),

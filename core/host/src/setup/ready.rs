@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use tandem_faults::{Faults, Joints};
-use tandem_gcode::{CheckReport, Config, Lasting, Ledger, Program, Stream, check};
+use tandem_gcode::{CheckReport, Config, Lasting, Ledger, Program, Stream, Watched, check};
 use tandem_machine::Machine;
 use tandem_rough::Source;
 use tandem_sdk::{Block, Curve, Kinematics, Planner};
@@ -195,18 +195,32 @@ impl Ready {
         let mut plugins = Plugins::of(&machine, registry)?;
         plugins.joints.check_start(&machine)?;
         let simulated = plugins.claim.describe().simulated != 0;
+        // What is wrong with it is told behind what is wrong with the program.
+        let policy = parts::policy(&machine, registry, &plugins.joints);
+        let watched = watched(&policy);
+        let config = |machine: &Machine| Config {
+            watched: watched.clone(),
+            ..parts::interpreter_config(machine, simulated, switches)
+        };
         // Only real drives know where a program on them begins.
         let asks_first = claims && !simulated;
         // The program first: where it needs another planner, what is wrong with this one does not matter.
-        let mut passed = (!asks_first)
-            .then(|| Passed::of(&machine, &plugins, &mut program, simulated, switches));
+        let mut passed = (!asks_first).then(|| {
+            Passed::of(
+                &machine,
+                &plugins,
+                &mut program,
+                &config(&machine),
+                &mut |_, _| (),
+            )
+        });
         if let Some(Err(refused)) = passed {
             return Err(refused);
         }
         plugins.check(&machine, switches)?;
         plugins.add_faults(&machine)?;
-        let policy = PolicyHost::open(&machine)?;
-        feed(&machine, registry, &plugins.joints, policy.as_ref(), 0.0)?;
+        let policy = policy?;
+        feed(&machine, registry, &plugins, policy.as_ref(), 0.0)?;
         if claims {
             let start = machine.start;
             (machine, plugins) = plugins.attach(machine, registry, switches)?;
@@ -214,13 +228,16 @@ impl Ready {
         }
         let passed = match passed {
             Some(passed) => passed?,
-            None => Passed::of(&machine, &plugins, &mut program, simulated, switches)?,
+            None => Passed::of(
+                &machine,
+                &plugins,
+                &mut program,
+                &config(&machine),
+                &mut |_, _| (),
+            )?,
         };
         let name = program.name().to_string();
-        let stream = Stream::new(
-            program,
-            &parts::interpreter_config(&machine, simulated, switches),
-        )?;
+        let stream = Stream::new(program, &config(&machine))?;
         let parts = (name, stream, plugins, policy);
         Self::of_stream(machine, registry, parts, passed, switches)
     }
@@ -242,11 +259,15 @@ impl Ready {
         let plugins = Plugins::on_drives(&machine, registry, roster)?;
         plugins.joints.check_start(&machine)?;
         let simulated = roster.describe().simulated != 0;
-        let config = memory.config(&machine, simulated, switches);
-        let passed = Passed::with(&machine, &plugins, &mut program, &config, see)?;
+        let policy = parts::policy(&machine, registry, &plugins.joints);
+        let config = Config {
+            watched: watched(&policy),
+            ..memory.config(&machine, simulated, switches)
+        };
+        let passed = Passed::of(&machine, &plugins, &mut program, &config, see)?;
         plugins.check(&machine, switches)?;
-        let policy = PolicyHost::open(&machine)?;
-        feed(&machine, registry, &plugins.joints, policy.as_ref(), 0.0)?;
+        let policy = policy?;
+        feed(&machine, registry, &plugins, policy.as_ref(), 0.0)?;
         let name = program.name().to_string();
         let mut stream = Stream::new(program, &config)?;
         stream.tell(memory.ledger.clone());
@@ -332,7 +353,7 @@ impl Ready {
         }
         plugins.check(&machine, switches)?;
         plugins.add_faults(&machine)?;
-        feed(&machine, registry, &plugins.joints, None, 0.0)?;
+        feed(&machine, registry, &plugins, None, 0.0)?;
         let (machine, plugins) = plugins.attach(machine, registry, switches)?;
         let source = source(&machine);
         Self::new(
@@ -362,7 +383,7 @@ impl Ready {
         let feed = feed(
             &machine,
             registry,
-            &plugins.joints,
+            &plugins,
             policy.as_ref(),
             checked.length_mm,
         )?;
@@ -394,25 +415,8 @@ struct Passed {
 }
 
 impl Passed {
-    /// The whole program through the interpreter and the planner.
+    /// The whole program, which begins as `config` says, through the interpreter and the planner.
     fn of(
-        machine: &Machine,
-        plugins: &Plugins,
-        program: &mut Program,
-        simulated: bool,
-        switches: Switches,
-    ) -> Result<Self, HostError> {
-        Self::with(
-            machine,
-            plugins,
-            program,
-            &parts::interpreter_config(machine, simulated, switches),
-            &mut |_, _| (),
-        )
-    }
-
-    /// The same for a program that begins as `config` says.
-    fn with(
         machine: &Machine,
         plugins: &Plugins,
         program: &mut Program,
@@ -443,14 +447,21 @@ impl Passed {
     }
 }
 
+/// What the policy script, if there is one, wants to know of the program.
+fn watched(policy: &Result<Option<PolicyHost>, HostError>) -> Vec<Watched> {
+    let script = policy.as_ref().ok().and_then(Option::as_ref);
+    script.map_or_else(Vec::new, PolicyHost::watched)
+}
+
 /// What asks feed strategy and policy, where there is either, for a program of `length_mm`.
 fn feed(
     machine: &Machine,
     registry: &Registry,
-    joints: &JointSpace,
+    plugins: &Plugins,
     policy: Option<&PolicyHost>,
     length_mm: f64,
 ) -> Result<Option<FeedRunner>, HostError> {
+    let joints = (plugins.joints.as_ref(), plugins.claim.delay_periods());
     let feed = parts::feed(machine, registry, joints, policy, length_mm)?;
     rules::check_signals(machine, feed.as_ref().map_or(&[][..], FeedRunner::signals))?;
     Ok(feed)
@@ -527,11 +538,11 @@ pub fn check_block(
 /// What stands for the name of a program in a run that only homes.
 const HOMING: &str = "(homing)";
 
-fn spindle_too_fast(asked_rad_per_s: f64, most_rad_per_s: f64) -> String {
+fn spindle_too_fast(asked_rad_per_s: f64, max_rad_per_s: f64) -> String {
     let rpm = |rad_per_s: f64| rad_per_s.abs() * 30.0 / std::f64::consts::PI;
     format!(
         "the spindle is asked for {:.0} rpm; it turns at most at {:.0}",
         rpm(asked_rad_per_s),
-        rpm(most_rad_per_s)
+        rpm(max_rad_per_s)
     )
 }

@@ -142,12 +142,22 @@ pub fn check_homing(
         );
     }
     if switches.home.is_some() && !joints.are_axes() {
-        let key = if machine.kinematics.plugin == "identity" {
-            "joints"
-        } else {
-            "kinematics.plugin"
+        let is_squared = machine.homing.iter().any(|homing| homing.foot.is_some());
+        let (key, cause) = match machine.kinematics.plugin.as_str() {
+            "identity" if is_squared => (
+                "homing",
+                "a gantry squares itself by `tandem home`, and by the request `home` of tandem serve: not in front of a program",
+            ),
+            "identity" => (
+                "joints",
+                "--home is refused: a gantry squares itself by a switch at each of its joints, in tables such as [homing.y1] and \
+                 [homing.y2] after their names",
+            ),
+            _ => (
+                "kinematics.plugin",
+                "--home is refused: each axis is homed by a drive of its own, so not with kinematics",
+            ),
         };
-        let cause = "--home is refused: each axis is homed by a drive of its own, so not with kinematics or gantries";
         return refuse(key, cause);
     }
     if machine.require_homing && switches.home.is_none() && !machine.homing.is_empty() && !stays {

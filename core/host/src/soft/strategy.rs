@@ -2,13 +2,15 @@
 
 use rtrb::Producer;
 use tandem_rings::{Ratio, RequestKind, Sample, StrategyRequest};
-use tandem_sdk::{Answer, FeedStrategy, FineSample, MAX_SIGNALS, Request, Window};
+use tandem_sdk::{Answer, FeedStrategy, FineSample, MAX_SIGNALS, Request, Window, Words};
 
-use crate::policy::{Means, PolicyHost};
+use crate::policy::{Looks, Means, PolicyHost};
 
 /// Collects the samples of a rough period and asks the strategy and the policy.
 pub struct FeedRunner {
     strategy: Option<Box<dyn FeedStrategy>>,
+    /// What the strategy answers counts an operator's feed override above 1 already.
+    takes_override: bool,
     /// The strategy's name, or the file that it came from.
     pub name: String,
     policy: Option<(PolicyHost, Means)>,
@@ -32,8 +34,10 @@ impl FeedRunner {
         max_ratio: f64,
     ) -> Self {
         let window = Vec::with_capacity(per_window);
+        let takes_override = strategy.as_ref().is_some_and(|it| it.takes_override());
         Self {
             strategy,
+            takes_override,
             name: String::new(),
             policy,
             window,
@@ -50,6 +54,11 @@ impl FeedRunner {
         self.strategy
             .as_ref()
             .map_or(&[], |strategy| strategy.signals())
+    }
+
+    /// Whether the ratios that go out count an operator's feed override above 1 already.
+    pub fn takes_override(&self) -> bool {
+        self.takes_override
     }
 
     /// Takes a sample; where it completes a rough period k, the lesser of the ratios that strategy and policy ask for goes
@@ -76,6 +85,10 @@ impl FeedRunner {
                 self.answer = answer.or(self.answer);
                 let strategy = answer.map(|answer| answer.ratio);
                 let ratio = match (strategy, self.ask_policy(period)) {
+                    // A policy asks for a ratio of what the operator makes of the programmed feed.
+                    (Some(strategy), Some(policy)) if self.takes_override => {
+                        strategy.min(policy * sample.feed_override.max(1.0))
+                    }
                     (Some(strategy), Some(policy)) => strategy.min(policy),
                     (strategy, policy) => strategy.or(policy).unwrap_or(1.0),
                 };
@@ -112,11 +125,13 @@ impl FeedRunner {
             .zip(values)
             .map(|(name, value)| format!("{name} = {value:.4}"))
             .collect();
-        let because = if signals.is_empty() {
-            String::new()
-        } else {
-            format!(": {}", signals.join(", "))
-        };
+        let words = self.strategy.as_ref().map(|strategy| strategy.explain());
+        let words = words.as_ref().map_or("", Words::as_str);
+        let signals = signals.join(", ");
+        let parts = [words, &signals].into_iter();
+        let because = parts
+            .filter(|text| !text.is_empty())
+            .fold(String::new(), |said, text| said + ": " + text);
         format!(
             "line {}: the feed strategy {} asks for a hold, at tick {tick}{because}",
             sample.line, self.name
@@ -149,7 +164,13 @@ impl FeedRunner {
             .answer
             .as_ref()
             .map(|answer| (answer.ratio, answer.signals.as_slice()));
-        policy.period(&means.of(period, &self.window, strategy))
+        policy.period(|script| {
+            let looks = Looks {
+                closer: script.looks_closer(),
+                signals: script.signals(),
+            };
+            means.of(period, &self.window, strategy, &looks)
+        })
     }
 
     fn fail(&mut self, cause: &str) -> RequestKind {
@@ -168,6 +189,7 @@ fn fine_sample(sample: &Sample) -> FineSample {
         current_a: sample.current_a,
         feed_mm_per_s: sample.feed_mm_per_s,
         programmed_feed_mm_per_s: sample.programmed_feed_mm_per_s,
+        feed_override: sample.feed_override,
         sigma: sample.sigma,
         spindle_rad_per_s: sample.spindle_rad_per_s,
         analog: sample.analog,

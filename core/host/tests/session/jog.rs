@@ -28,7 +28,7 @@ fn a_late_keep_alive_stops_the_machine_while_the_rough_loop_does_nothing() {
     rig.host
         .controls
         .jog
-        .most_periods
+        .max_periods
         .store(PERIODS as u64, Relaxed);
     let before = rig.samples.len();
     rig.stall(5);
@@ -50,7 +50,7 @@ fn a_late_keep_alive_stops_the_machine_while_the_rough_loop_does_nothing() {
     );
     rig.host.controls.jog.let_go.store(false, Relaxed);
     rig.line([0.0, 0.0], FEED_MM_PER_S);
-    rig.host.controls.jog.most_periods.store(0, Relaxed);
+    rig.host.controls.jog.max_periods.store(0, Relaxed);
     rig.until_driven();
     rig.assert_smooth();
 }
@@ -58,7 +58,7 @@ fn a_late_keep_alive_stops_the_machine_while_the_rough_loop_does_nothing() {
 #[test]
 fn beats_keep_it_alive() {
     let mut rig = moving();
-    rig.host.controls.jog.most_periods.store(20, Relaxed);
+    rig.host.controls.jog.max_periods.store(20, Relaxed);
     for _ in 0..20 {
         rig.host.controls.jog.beats.fetch_add(1, Relaxed);
         rig.rough_periods(2);

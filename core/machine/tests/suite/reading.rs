@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
 use crate::common::{fixtures, read};
-use tandem_machine::{FineThread, GuardMode, JerkMode, Machine, Place, Role};
+use tandem_machine::{FineThread, GuardMode, JerkMode, Machine, Role, ValuePlace};
 
 fn full() -> Machine {
     read(&fixtures().join("good/full.toml"), &[]).unwrap()
@@ -284,7 +284,10 @@ fn the_other_tables() {
     };
     let [by_c, by_x] = [c, x].map(|homing| *homing.switch().expect("a switch"));
     assert!(
-        machine.require_homing && c.sequence == 1 && !by_c.inverted && close(by_c.switch_mm, PI)
+        machine.require_homing
+            && c.sequence == Some(1)
+            && !by_c.inverted
+            && close(by_c.switch_mm, PI)
     );
     assert_eq!((x.axis, by_x.input, by_x.inverted), (0, 10, true));
     assert_eq!((by_x.search_mm_per_s, by_x.latch_mm_per_s), (-10.0, 1.0));
@@ -423,7 +426,7 @@ fn places() {
     assert_eq!(place("coolant"), "good/full.toml:1:1");
     assert_eq!(
         machine.place("planner.options.zeta"),
-        Place::Override("planner.options.zeta".to_owned())
+        ValuePlace::Override("planner.options.zeta".to_owned())
     );
 }
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::common::fixtures;
-use tandem_machine::{Key, Machine, Place, keys, markdown, tool_keys};
+use tandem_machine::{Key, Machine, ValuePlace, keys, markdown, tool_keys};
 
 /// The names that a key's path has in `good/full.toml`.
 fn path(key: &Key) -> String {
@@ -39,7 +39,7 @@ fn every_key_is_read() {
         let error = Machine::read(&fixtures().join("good/full.toml"), &[wrong]).expect_err(&path);
         assert_eq!(
             error.problems[0].place,
-            Place::Override(path.clone()),
+            ValuePlace::Override(path.clone()),
             "{error}"
         );
         assert_eq!(error.problems[0].key, path, "{error}");

@@ -78,8 +78,8 @@ impl ArcLength {
         more
     }
 
-    /// Adds the next knot span as far as it lies within `range`, unless that is shorter than `least_mm`.
-    fn add_part(&mut self, curve: &Nurbs, range: (f64, f64), least_mm: f64) {
+    /// Adds the next knot span as far as it lies within `range`, unless that is shorter than `min_mm`.
+    fn add_part(&mut self, curve: &Nurbs, range: (f64, f64), min_mm: f64) {
         let span = self.next_span;
         self.next_span += 1;
         let from = curve.knots()[span].max(range.0);
@@ -89,7 +89,7 @@ impl ArcLength {
         } else {
             0.0
         };
-        if to > from && whole >= least_mm {
+        if to > from && whole >= min_mm {
             let start_mm = self.built.mm;
             self.add(curve, span, (from, to), whole, MAX_HALVINGS);
             self.lines.extend(Line::new(

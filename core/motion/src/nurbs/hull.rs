@@ -122,7 +122,7 @@ impl Hull {
     }
 
     /// No point of it is nearer to `point` than this, mm.
-    pub fn least_distance_mm(&self, point: &AxisVector) -> f64 {
+    pub fn min_distance_mm(&self, point: &AxisVector) -> f64 {
         let off = |axis: usize| {
             let (low, high) = self.bounds(axis);
             (low - point[axis]).max(point[axis] - high).max(0.0)

@@ -59,7 +59,7 @@ impl Nurbs {
     ) -> Nearest {
         for span in spans {
             if self.knots[span + 1] > self.knots[span]
-                && self.least_distance_mm(span, point) < best.distance_mm
+                && self.min_distance_mm(span, point) < best.distance_mm
             {
                 self.nearest_in(span, point, &mut best);
                 if best.distance_mm > ON_CURVE_MM {
@@ -71,7 +71,7 @@ impl Nurbs {
     }
 
     /// No point of `span` is nearer to `point` than this, mm: it stays between its control points.
-    fn least_distance_mm(&self, span: usize, point: &AxisVector) -> f64 {
+    fn min_distance_mm(&self, span: usize, point: &AxisVector) -> f64 {
         let mut low = AxisVector([f64::INFINITY; MAX_AXES]);
         let mut high = AxisVector([f64::NEG_INFINITY; MAX_AXES]);
         for index in span - self.degree..=span {
@@ -101,7 +101,7 @@ impl Nurbs {
         halvings: u32,
         best: &mut Nearest,
     ) {
-        if part.least_distance_mm(point) >= PROVED * best.distance_mm - ROUNDING {
+        if part.min_distance_mm(point) >= PROVED * best.distance_mm - ROUNDING {
             return;
         }
         for (u, end) in [part.range.0, part.range.1].into_iter().zip(part.ends()) {
@@ -112,7 +112,7 @@ impl Nurbs {
         }
         if halvings > 0 {
             let mut halves = part.halves();
-            if halves[1].least_distance_mm(point) < halves[0].least_distance_mm(point) {
+            if halves[1].min_distance_mm(point) < halves[0].min_distance_mm(point) {
                 halves.swap(0, 1);
             }
             for half in &halves {

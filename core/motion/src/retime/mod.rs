@@ -17,77 +17,64 @@
 //! tracking for robots", IEEE Trans. Autom. Control 54(10), 2009, for the second order), here in pseudo-time so that rests
 //! are regular points.
 //!
-//! Rough loop. A [`Retimer`] allocates when its grid grows; solving again on a grid no larger does not allocate.
+//! [`Retimer`] works on all axes of a number known to the compiler at once; [`AnyRetimer`] takes the number as it comes.
+//!
+//! Rough loop. Both allocate when the grid grows; solving again on a grid no larger does not allocate.
 
+#![allow(
+    clippy::inline_always,
+    reason = "what is inlined is compiled for the wide instructions of its caller"
+)]
+#![allow(
+    clippy::needless_range_loop,
+    reason = "axes of several arrays go side by side"
+)]
+
+mod any;
 mod banded;
-mod newton;
-mod rows;
-mod solve;
+mod retimer;
+mod share;
 mod timing;
 
-pub use banded::Pentadiagonal;
-pub use solve::{Retimer, Status, Task};
+pub use any::{AnyRetimer, AxisLimits, Between, Task};
+pub use retimer::{Asked, Factors, Retimer, Status};
 pub use timing::{Rate, weights};
 
-/// Axes that a retiming takes.
-pub const MAX_LANES: usize = tandem_sdk::MAX_AXES;
+use crate::lanes::Lanes;
 
-/// Places on each interval at which limits are asked for: its start, its middle and its end.
+/// Places on each interval at which limits are asked for.
 pub const PLACES: usize = 3;
+/// Where they are: at its start, in its middle and at its end.
+pub const GRID: [f64; PLACES] = [0.0, 0.5, 1.0];
 
 /// The motion at one place: derivatives by pseudo-time per axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Point {
+pub struct Point<const L: usize> {
     /// First derivative, mm/s.
-    pub first: [f64; MAX_LANES],
+    pub first: Lanes<L>,
     /// Second derivative, mm/s².
-    pub second: [f64; MAX_LANES],
+    pub second: Lanes<L>,
     /// Third derivative, mm/s³, of the interval that the point belongs to.
-    pub third: [f64; MAX_LANES],
+    pub third: Lanes<L>,
     /// Highest rate squared here: feed, chord error and axis speeds together.
     pub most: f64,
-    /// Share of the jerk limits that may be used here, beside that of the whole motion: less where the motion between the
-    /// places takes more jerk than at them.
+    /// Share of the jerk that may be used here: less where the motion between the places takes more jerk than at them.
     pub jerk_share: f64,
-    /// Share of the acceleration limits that may be used here.
+    /// Share of the acceleration that may be used here.
     pub acceleration_share: f64,
 }
 
-impl Default for Point {
+impl<const L: usize> Default for Point<L> {
     fn default() -> Self {
-        let zero = [0.0; MAX_LANES];
         Self {
-            first: zero,
-            second: zero,
-            third: zero,
+            first: [0.0; L],
+            second: [0.0; L],
+            third: [0.0; L],
             most: f64::INFINITY,
             jerk_share: 1.0,
             acceleration_share: 1.0,
         }
     }
-}
-
-/// Further places of an interval at which limits are asked for: where a derivative of the motion jumps both sides of that,
-/// where it turns much more places between.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Between {
-    /// The interval.
-    pub interval: usize,
-    /// Where in it, 0 to 1.
-    pub z: [f64; PLACES],
-    /// The motion there.
-    pub points: [Point; PLACES],
-}
-
-/// What each axis may do.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LaneLimits {
-    /// Number of axes.
-    pub lanes: usize,
-    /// Acceleration, mm/s².
-    pub acceleration: [f64; MAX_LANES],
-    /// Jerk, mm/s³.
-    pub jerk: [f64; MAX_LANES],
 }
 
 /// How the motion begins or ends.

@@ -1,6 +1,6 @@
 //! Symmetric positive definite systems of half bandwidth 3, one a lane.
 
-use super::lanes::{Lanes, each};
+use crate::lanes::{Lanes, each};
 
 /// A row: its diagonal entry and the three entries right of it, of every lane.
 pub type Row<const L: usize> = [Lanes<L>; 4];

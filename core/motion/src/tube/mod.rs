@@ -3,8 +3,7 @@
 //! A motion is a uniform cubic B-spline x(τ) in a pseudo-time τ, one lane an axis. Two solvers take turns:
 //!
 //! * [`Smoother`]: the spline with the least jerk that passes boxes around given points at given pseudo-times;
-//! * [`Pacer`]: the rate b(τ) = (dτ/dt)² for which the time is least and every lane keeps its limits. What is said of
-//!   [`crate::retime`] holds here; this one works on all lanes at once, for the short grids of a planner on the move.
+//! * [`crate::retime::Retimer`]: the rate b(τ) = (dτ/dt)² for which the time is least and every lane keeps its limits.
 //!
 //! Both are primal-dual interior point methods on banded systems: the work is linear in the grid, and bounded.
 //!
@@ -20,13 +19,9 @@
 )]
 
 mod banded;
-mod lanes;
-mod pace_share;
-mod pacer;
 mod smoother;
 mod spline;
 
-pub use lanes::{Lanes, each};
-pub use pacer::{Asked, PaceStatus, Pacer, Place};
+pub use crate::lanes::{Lanes, each};
 pub use smoother::{SmoothStatus, Smoother, Waypoint};
 pub use spline::Spline;

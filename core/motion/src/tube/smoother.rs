@@ -1,8 +1,8 @@
 //! The spline of least jerk through boxes.
 
 use super::banded::{self, Row};
-use super::lanes::{Lanes, each, larger, largest, smaller};
 use super::spline::{Spline, weights};
+use crate::lanes::{Lanes, each, larger, largest, smaller};
 
 /// Iterations at most.
 const ITERATIONS: usize = 14;
@@ -269,7 +269,7 @@ impl<const L: usize> Smoother<L> {
         self.step[count - 3..].fill([0.0; L]);
         // The largest relative decrease of a slack and of a multiplier.
         let mut most = [0.0; L];
-        let mut most_back = [0.0; L];
+        let mut max_back = [0.0; L];
         for row in &mut self.rows {
             let steps = self.step[row.interval..]
                 .first_chunk()
@@ -283,12 +283,12 @@ impl<const L: usize> Smoother<L> {
                 let inverse = &row.inverse[n];
                 let shrinking: Lanes<L> = each(|l| -change[l] * multiplier[l] * inverse[l]);
                 most = each(|l| larger(most[l], shrinking[l]));
-                most_back =
-                    each(|l| larger(most_back[l], 1.0 - shrinking[l] - target[l] * inverse[l]));
+                max_back =
+                    each(|l| larger(max_back[l], 1.0 - shrinking[l] - target[l] * inverse[l]));
             }
         }
         let length: Lanes<L> = each(|l| smaller(1.0, BOUNDARY / larger(most[l], 1e-9)));
-        let back: Lanes<L> = each(|l| smaller(1.0, BOUNDARY / larger(most_back[l], 1e-9)));
+        let back: Lanes<L> = each(|l| smaller(1.0, BOUNDARY / larger(max_back[l], 1e-9)));
         for row in &mut self.rows {
             for n in 0..2 {
                 let slack = row.slack[n];

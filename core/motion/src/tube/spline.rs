@@ -1,6 +1,6 @@
 //! The uniform cubic B-spline.
 
-use super::lanes::{Lanes, each};
+use crate::lanes::{Lanes, each};
 
 /// A uniform cubic B-spline over pseudo-time from 0 to intervals × step.
 #[derive(Clone, Debug)]

@@ -2,8 +2,9 @@
 
 use serde_json::Value;
 use tandem_motion::nurbs::{ArcLength, Nurbs, Place};
+use tandem_rig::{case, curve as data, numbers};
 
-use crate::common::{canonical, case, curve, data, distance, numbers};
+use crate::common::{canonical, curve, distance};
 
 fn assert_near(got: &[f64], expected: &[f64], relative: f64, what: &str) {
     let scale = expected.iter().map(|v| v.abs()).fold(1.0, f64::max);

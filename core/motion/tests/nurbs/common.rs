@@ -1,6 +1,5 @@
 //! Curves to test with.
 
-use serde_json::Value;
 use tandem_motion::nurbs::Nurbs;
 use tandem_sdk::{Axes, AxisVector, NurbsData};
 
@@ -8,47 +7,9 @@ pub fn axes() -> Axes {
     Axes::new(&[('X', false), ('Y', false), ('Z', false)]).unwrap()
 }
 
-pub fn case(name: &str) -> Value {
-    let path = format!(
-        "{}/../../tests/fixtures/cases/{name}.json",
-        env!("CARGO_MANIFEST_DIR")
-    );
-    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
-}
-
-pub fn numbers(value: &Value) -> Vec<f64> {
-    value
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|v| v.as_f64().unwrap())
-        .collect()
-}
-
-/// The curve of a case.
-pub fn data(curve: &Value) -> NurbsData {
-    let points = curve["control_points"].as_array().unwrap();
-    NurbsData {
-        degree: curve["degree"].as_u64().unwrap() as usize,
-        control_points: points
-            .iter()
-            .map(|p| AxisVector::from_slice(&numbers(p)))
-            .collect(),
-        weights: numbers(&curve["weights"]),
-        knots: numbers(&curve["knots"]),
-    }
-}
-
 /// The canonical curve `name`.
 pub fn canonical(name: &str) -> Nurbs {
-    let case = case("002_nurbs_eval");
-    let curve = case["curves"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .find(|c| c["name"] == name)
-        .unwrap();
-    Nurbs::new(&data(curve), &axes()).unwrap()
+    curve(&tandem_rig::curve(&tandem_rig::canonical_curve(name)))
 }
 
 /// A clamped curve over uniform knots.

@@ -1,6 +1,7 @@
 //! A motion along a path: the coordinate as a cubic B-spline of pseudo-time, retimed in rounds.
 
-use tandem_motion::retime::{End, LaneLimits, PLACES, Point, Retimer, Status, Task};
+use tandem_motion::retime::{AnyRetimer, AxisLimits, End, GRID, PLACES, Point, Status, Task};
+use tandem_sdk::MAX_AXES;
 
 /// A path by its length: first to third derivative in two axes.
 pub struct Along {
@@ -20,7 +21,7 @@ pub struct Retimed {
 const PERIOD_S: f64 = 1e-3;
 
 /// Begins with a motion that is far too slow, and makes it fast in `rounds`.
-pub fn retimed(along: &Along, limits: &LaneLimits, step_s: f64, rounds: usize) -> Retimed {
+pub fn retimed(along: &Along, limits: &AxisLimits, step_s: f64, rounds: usize) -> Retimed {
     let slow_s = 4.0 * along.length / along.feed + 0.2;
     // Speed rises and falls as a square of a sine: smooth at both ends.
     let slow = |t: f64| {
@@ -31,22 +32,21 @@ pub fn retimed(along: &Along, limits: &LaneLimits, step_s: f64, rounds: usize) -
         .map(|i| slow_s * f64::from(i) / 4000.0)
         .map(|t| (t, slow(t)))
         .collect();
-    let mut retimer = Retimer::default();
+    let mut retimer = AnyRetimer::default();
     let mut done = None;
     for _ in 0..rounds {
         let total = timing.last().unwrap().0;
         let count = ((total / step_s).ceil() as usize).max(7);
         let h = total / count as f64;
         let spline = coefficients(&timing, h, count, along.length);
-        let points: Vec<[Point; PLACES]> = (0..count)
-            .map(|k| [0.0, 0.5, 1.0].map(|z| point(along, value(&spline, k, z, h))))
+        let points: Vec<[Point<MAX_AXES>; PLACES]> = (0..count)
+            .map(|k| GRID.map(|z| point(along, value(&spline, k, z, h))))
             .collect();
         let ends = (End::Rest, End::Rest);
         let status = retimer.solve(&Task {
             points: &points,
             between: &[],
-            limits: *limits,
-            jerk_share: 0.99,
+            limits: shared(limits),
             step_s: h,
             ends,
         });
@@ -67,7 +67,16 @@ pub fn retimed(along: &Along, limits: &LaneLimits, step_s: f64, rounds: usize) -
     done.unwrap()
 }
 
-fn point(along: &Along, [s, s1, s2, s3]: [f64; 4]) -> Point {
+/// Shares of the limits that leave room for what lies between the places.
+fn shared(limits: &AxisLimits) -> AxisLimits {
+    AxisLimits {
+        acceleration_mm_per_s2: limits.acceleration_mm_per_s2.map(|a| 0.99 * a),
+        jerk_mm_per_s3: limits.jerk_mm_per_s3.map(|j| 0.99 * j),
+        ..*limits
+    }
+}
+
+fn point(along: &Along, [s, s1, s2, s3]: [f64; 4]) -> Point<MAX_AXES> {
     let [x1, x2, x3] = (along.derivatives)(s);
     let mut point = Point::default();
     for lane in 0..along.lanes {
@@ -123,7 +132,7 @@ fn value(c: &[f64], k: usize, z: f64, h: f64) -> [f64; 4] {
     ]
 }
 
-fn sampled(retimer: &Retimer, spline: &[f64], count: usize, h: f64) -> Vec<f64> {
+fn sampled(retimer: &AnyRetimer, spline: &[f64], count: usize, h: f64) -> Vec<f64> {
     let (mut samples, mut k, mut start, mut t) = (vec![], 0, 0.0, 0.0);
     while k < count {
         let whole = retimer.rate.time_s(k, 1.0, h);

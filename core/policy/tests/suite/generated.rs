@@ -55,6 +55,12 @@ fn wanted() -> usize {
     std::env::var("TANDEM_MODULES").map_or(60, |count| count.parse().unwrap())
 }
 
+/// The same in version 2, whose blocks and period are longer.
+const LAYOUT_V2: &str = r#"
+  (data (i32.const 16) "\40\00\00\00\80\02\00\00\00\10\00\00\40\00\00\00\38\02\00\00\00\02\00\00")
+  (data (i32.const 56) "\00\40\00\00\08\00\00\00\00\00\00\00\00\00\00\00\00\00\00\00")
+  (func (export "tandem_policy_v2") (result i32) i32.const 16))"#;
+
 /// A module with the exports of a policy, and a layout that is right.
 fn policy(random: &mut Random) -> Option<String> {
     let exports = wat::parse_str(EXPORTS).unwrap();
@@ -66,7 +72,8 @@ fn policy(random: &mut Random) -> Option<String> {
         random,
     )?;
     let text = wasmprinter::print_bytes(made).unwrap();
-    Some(format!("{}{LAYOUT}", text.trim_end().strip_suffix(')')?))
+    let layout = random.pick(&[LAYOUT, LAYOUT_V2]);
+    Some(format!("{}{layout}", text.trim_end().strip_suffix(')')?))
 }
 
 /// Starts and calls a module twice: whatever it is, both come out the same and within the machine. Why it did not start,

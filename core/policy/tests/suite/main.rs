@@ -6,11 +6,12 @@ mod layouts;
 mod refusals;
 mod reload;
 mod scripts;
+mod sight;
 
 use std::path::{Path, PathBuf};
 
 use tandem_policy::{Bounds, Budget, Engine, Facts, Policy, Refusal, Script, Values};
-use tandem_sdk::{Axes, AxisVector, Block, BlockKind};
+use tandem_sdk::{AxisVector, Block, BlockKind};
 
 /// The folder of the workspace.
 fn root() -> PathBuf {
@@ -48,16 +49,6 @@ fn compile(bytes: &[u8]) -> Result<Script, Refusal> {
     engine().compile(bytes)
 }
 
-fn facts() -> Facts {
-    let axes = Axes::new(&[('X', false), ('Y', false), ('Z', false)]).unwrap();
-    Facts {
-        axes,
-        time_constant_s: 0.05,
-        path_tolerance_mm: 0.01,
-        rough_period_s: 0.008,
-    }
-}
-
 fn values(stated: &[(&str, f64)]) -> Values {
     stated
         .iter()
@@ -71,8 +62,21 @@ fn start(bytes: &[u8], stated: &[(&str, f64)]) -> Result<Policy, Refusal> {
         values(stated),
         Budget::default(),
         Bounds::default(),
-        &facts(),
+        &Facts::default(),
     )
+}
+
+/// A script of version 1 in text form whose window, period and state are where the fixtures have them, as one of version 2
+/// that looks at the geometry of blocks.
+fn as_version_2(module: &[u8]) -> Vec<u8> {
+    let text = String::from_utf8(module.to_vec()).unwrap();
+    let old = r"\30\00\00\00\78\00\00\00\00\04\00\00\40\00\00\00\b0\00\00\00\00\02\00\00";
+    let new = r"\40\00\00\00\80\02\00\00\00\10\00\00\40\00\00\00\38\02\00\00\00\02\00\00";
+    assert!(text.contains(old) && text.contains("tandem_policy_v1"));
+    text.replace(old, new)
+        .replace("tandem_policy_v1", "tandem_policy_v2")
+        .replace("(i32.const 120)", "(i32.const 640)")
+        .into_bytes()
 }
 
 /// A line of 10 mm that leaves `from` in the direction `degrees`, at 50 mm/s.

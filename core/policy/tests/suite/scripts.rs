@@ -1,7 +1,7 @@
 //! The scripts that come with the machine, as they are built.
 
-use tandem_policy::{Budget, Instance, Period};
-use tandem_sdk::{Block, BlockKind};
+use tandem_policy::{Bounds, Budget, Facts, Instance, Period, Policy};
+use tandem_sdk::{AxisVector, Block, BlockKind};
 
 use crate::{chain, compile, decide, read, start};
 
@@ -124,6 +124,10 @@ fn parameters_are_declared_with_range_default_and_description() {
         ("gentle-start", 4),
         ("load-feed", 4),
         ("material-feed", 2),
+        ("gentle-plunge", 3),
+        ("warm-spindle", 3),
+        ("curvature-tolerance", 3),
+        ("keep-contour", 3),
     ] {
         let script = compile(&read(&format!("scripts/policies/{script}.wasm"))).unwrap();
         let instance = Instance::new(&script, &Budget::default(), &[]).unwrap();
@@ -137,4 +141,157 @@ fn parameters_are_declared_with_range_default_and_description() {
             instance.parameters()
         );
     }
+}
+
+/// A line that goes down by `down_mm` over 3 mm, from `height_mm` of the program.
+fn descent(height_mm: f64, down_mm: f64, tool: u32) -> Block {
+    let offset = AxisVector::from_slice(&[100.0, 50.0, -80.0]);
+    let start = AxisVector::from_slice(&[100.0, 50.0, height_mm - 80.0]);
+    Block {
+        kind: BlockKind::Line,
+        end: start + AxisVector::from_slice(&[3.0, 0.0, -down_mm]),
+        offset,
+        length_mm: 3.0_f64.hypot(down_mm),
+        feed_mm_per_s: 50.0,
+        tool,
+        ..Block::at(start)
+    }
+}
+
+#[test]
+fn gentle_plunge_holds_the_speed_of_the_descent_below_the_surface() {
+    let script = compile(&read("scripts/policies/gentle-plunge.wasm")).unwrap();
+    let facts = Facts {
+        tool_diameters_mm: vec![(2, 6.0)],
+        ..Facts::default()
+    };
+    let stated = crate::values(&[("plunge_mm_per_min", 300.0), ("surface_mm", 2.0)]);
+    let mut policy =
+        Policy::new(script, stated, Budget::default(), Bounds::default(), &facts).unwrap();
+    let mut cap = |block: Block| {
+        decide(&mut policy, &[block]);
+        policy.tuning(0).feed_cap_mm_per_s
+    };
+    // Four down for five along: at 5 mm/s of descent 6.25 mm/s of path.
+    assert!((cap(descent(0.0, 4.0, 9)).unwrap() - 6.25).abs() < 1e-12);
+    // The table says 6 mm, and 50 mm/min a mm.
+    assert!((cap(descent(0.0, 4.0, 2)).unwrap() - 6.25).abs() < 1e-12);
+    assert_eq!(
+        cap(descent(10.0, 4.0, 9)),
+        None,
+        "it ends above the surface"
+    );
+    assert_eq!(cap(descent(0.0, -4.0, 9)), None, "it goes up");
+    assert_eq!(cap(descent(0.0, 0.0, 9)), None, "it goes along");
+    assert_eq!(
+        cap(descent(0.0, 0.1, 9)),
+        None,
+        "so flat that the feed is low enough"
+    );
+}
+
+#[test]
+fn warm_spindle_lowers_the_feed_with_the_temperature() {
+    let script = compile(&read("scripts/policies/warm-spindle.wasm")).unwrap();
+    let facts = Facts {
+        signals: vec!["door".to_string(), "spindle_temperature_c".to_string()],
+        ..Facts::default()
+    };
+    let budget = Budget::default();
+    let mut policy = Policy::new(script, vec![], budget, Bounds::default(), &facts).unwrap();
+    assert_eq!(policy.signals(), [1]);
+    let mut ratio = |celsius: f64| {
+        let mut period = Period {
+            duration_s: 0.008,
+            ..Period::default()
+        };
+        period.signals[0] = celsius;
+        policy.period(&period)
+    };
+    for (celsius, expected) in [
+        (20.0, 1.0),
+        (60.0, 1.0),
+        (70.0, 0.65),
+        (80.0, 0.3),
+        (200.0, 0.3),
+    ] {
+        let given = ratio(celsius).unwrap();
+        assert!((given - expected).abs() < 1e-12, "{celsius}: {given}");
+    }
+    assert_eq!(
+        ratio(f64::NAN),
+        None,
+        "a sensor that is not heard of asks for nothing"
+    );
+}
+
+#[test]
+fn curvature_tolerance_is_a_share_of_the_radius() {
+    let bytes = read("scripts/policies/curvature-tolerance.wasm");
+    let mut policy = start(&bytes, &[("share_of_radius", 1e-4)]).unwrap();
+    // Chords of 10 mm that turn by 0.05 rad lie on a circle of 200 mm.
+    let degrees = [0.0, 0.05_f64.to_degrees(), 0.1_f64.to_degrees()];
+    decide(&mut policy, &chain(&degrees));
+    assert_eq!(
+        policy.tuning(1).path_tolerance_mm,
+        None,
+        "10 um are in force"
+    );
+    let degrees = [0.0, 0.5_f64.to_degrees(), 1.0_f64.to_degrees()];
+    decide(&mut policy, &chain(&degrees));
+    let given = policy.tuning(1).path_tolerance_mm.unwrap();
+    assert!((given - 20.0 * 1e-4).abs() < 1e-9, "{given}");
+}
+
+#[test]
+fn material_feed_goes_by_what_the_program_states() {
+    let bytes = read("scripts/policies/material-feed.wasm");
+    let mut policy = start(&bytes, &[("material", 3.0)]).unwrap();
+    let names: Vec<_> = policy.program_inputs().iter().map(|i| &i.name).collect();
+    assert_eq!(names, ["material"]);
+    assert_eq!(
+        policy.program_inputs()[0].words,
+        ["aluminium", "brass", "steel", "stainless"]
+    );
+    let blocks = chain(&[0.0; 3]);
+    policy.offer(&blocks[0], None);
+    policy.state(0, 2.0);
+    policy.offer(&blocks[1], None);
+    policy.state(0, f64::NAN);
+    policy.offer(&blocks[2], None);
+    policy.decide(None);
+    let caps: Vec<_> = (0..3)
+        .map(|index| policy.tuning(index).feed_cap_mm_per_s)
+        .collect();
+    let of = |mm_per_min: f64| Some(mm_per_min / 60.0);
+    assert_eq!(caps, [of(800.0), of(1200.0), of(800.0)]);
+    policy.state(0, 7.0);
+    decide(&mut policy, &blocks);
+    let cap = policy.tuning(0).feed_cap_mm_per_s;
+    assert_eq!(cap, of(800.0), "no row of the table");
+}
+
+#[test]
+fn keep_contour_lowers_the_feed_of_the_axis_that_lags() {
+    let bytes = read("scripts/policies/keep-contour.wasm");
+    let mut policy = start(&bytes, &[("axis_error_um", 20.0)]).unwrap();
+    let mut ratio = |axis: usize, error_mm: f64, sigma: f64| {
+        let mut period = Period {
+            duration_s: 0.008,
+            sigma,
+            ..Period::default()
+        };
+        period.max_axis_error[axis] = error_mm;
+        policy.period(&period).unwrap()
+    };
+    assert_eq!(ratio(1, 0.01, 1.0), 1.0);
+    assert!((ratio(2, 0.04, 1.0) - 0.5).abs() < 1e-12);
+    assert!(
+        (ratio(2, 0.02, 0.5) - 0.508).abs() < 1e-12,
+        "it comes back slowly"
+    );
+    assert!(
+        (ratio(0, 0.4, 0.5) - 0.2).abs() < 1e-12,
+        "not below the lowest"
+    );
 }

@@ -148,6 +148,13 @@ impl EventsCsv {
         queue.push_back(word);
     }
 
+    /// No further row comes: what is written stays beside the file that it does not become.
+    pub fn give_up(mut self) {
+        self.out.keep();
+        // What cannot be written is not tried once more.
+        let _ = self.out.close();
+    }
+
     /// A sample was sent: what it switches is written. After an error all further ones are left out.
     ///
     /// # Errors

@@ -18,21 +18,21 @@ pub struct Output {
     path: PathBuf,
     part: Option<PathBuf>,
     /// The thread that writes is the only one that takes it, unless the process ends before its time.
-    writer: Arc<Place>,
+    writer: Arc<SharedWriter>,
     /// The file that is not complete stays beside the one that it would have become.
     keeps: bool,
 }
 
-type Place = Mutex<Option<BufWriter<File>>>;
+type SharedWriter = Mutex<Option<BufWriter<File>>>;
 
 /// The files in the making: what writes them, and where they lie meanwhile.
-static OPEN: Mutex<Vec<(Weak<Place>, PathBuf)>> = Mutex::new(Vec::new());
+static OPEN: Mutex<Vec<(Weak<SharedWriter>, PathBuf)>> = Mutex::new(Vec::new());
 
 /// The process is about to end before its time: what was written of each file until now goes onto the disk. The answer is
 /// where. Host, from any thread.
 pub fn flush_outputs() -> Vec<PathBuf> {
     let open = std::mem::take(&mut *lock(&OPEN));
-    let flush = |(writer, path): (Weak<Place>, PathBuf)| {
+    let flush = |(writer, path): (Weak<SharedWriter>, PathBuf)| {
         let writer = writer.upgrade()?;
         // Who writes at this moment may be the one that hangs, on a disk that does not answer: it is not waited for.
         let mut writer = writer.try_lock().ok()?;
@@ -47,7 +47,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-fn begin(file: File, path: &Path) -> Arc<Place> {
+fn begin(file: File, path: &Path) -> Arc<SharedWriter> {
     let writer = Arc::new(Mutex::new(Some(BufWriter::with_capacity(1 << 16, file))));
     let mut open = lock(&OPEN);
     open.retain(|(other, _)| other.strong_count() > 0);

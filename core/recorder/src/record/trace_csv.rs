@@ -82,6 +82,13 @@ impl TraceCsv {
         }
     }
 
+    /// No further row comes: what is written stays beside the file that it does not become.
+    pub fn give_up(mut self) {
+        self.out.keep();
+        // What cannot be written is not tried once more.
+        let _ = self.out.close();
+    }
+
     /// The time at which a tick stands in the trace, s.
     pub fn t_s(tick: u64, fine_period_s: f64) -> f64 {
         // A whole number of periods divided by a round number of periods a second keeps t_s free of rounding dust.

@@ -1,5 +1,7 @@
 //! Logarithmic scales.
 
+use crate::chart::Mark;
+
 /// From values to places on the page.
 #[derive(Clone, Copy, Debug)]
 pub struct Scale {
@@ -35,6 +37,13 @@ impl Scale {
         let share =
             (value.clamp(self.low, self.high) / self.low).ln() / (self.high / self.low).ln();
         self.from + share * (self.to - self.from)
+    }
+
+    /// The marks with their places.
+    pub fn places(&self) -> impl Iterator<Item = Mark> {
+        self.marks()
+            .into_iter()
+            .map(|mark| (mark, self.place(mark)))
     }
 
     /// The powers of ten within, and where there are few, 2 and 5 times them.

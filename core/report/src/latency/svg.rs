@@ -3,10 +3,14 @@
 use std::fmt::Write;
 
 use super::{LatencyBin, LatencySeries, scale::Scale};
+use crate::chart::Chart;
 use crate::text::number;
 
-const WIDTH: f64 = 920.0;
-const HEIGHT: f64 = 250.0;
+const CHART: Chart = Chart {
+    width: 920.0,
+    height: 250.0,
+    area: AREA,
+};
 /// Where the drawing lies: left, right, top, bottom.
 const AREA: [f64; 4] = [64.0, 900.0, 14.0, 214.0];
 
@@ -87,50 +91,10 @@ fn lateness(series: &[LatencySeries]) -> Scale {
 
 /// Scales, grid and content.
 fn drawing(x: Scale, y: Scale, what: &str, content: &str) -> String {
-    let mut text = format!(
-        "<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{what} by lateness\">"
-    );
-    for mark in x.marks() {
-        let at = x.place(mark);
-        let _ = write!(
-            text,
-            "<path class=\"grid\" d=\"M{at:.1} {} V{}\"/>",
-            AREA[2], AREA[3]
-        );
-        let _ = write!(
-            text,
-            "<text x=\"{at:.1}\" y=\"{}\" text-anchor=\"middle\">{}</text>",
-            AREA[3] + 15.0,
-            number(mark)
-        );
-    }
-    for mark in y.marks() {
-        let at = y.place(mark);
-        let _ = write!(
-            text,
-            "<path class=\"grid\" d=\"M{} {at:.1} H{}\"/>",
-            AREA[0], AREA[1]
-        );
-        let _ = write!(
-            text,
-            "<text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
-            AREA[0] - 6.0,
-            at + 4.0,
-            number(mark)
-        );
-    }
-    let _ = write!(
-        text,
-        "<text x=\"{}\" y=\"{}\" text-anchor=\"end\">lateness, µs</text>",
-        AREA[1],
-        HEIGHT - 5.0
-    );
-    let _ = write!(
-        text,
-        "<text x=\"6\" y=\"{}\">{what}</text>{content}</svg>",
-        HEIGHT - 5.0
-    );
-    text
+    let mut text = CHART.begin(&format!("{what} by lateness"));
+    CHART.grid(x.places(), y.places(), &mut text);
+    CHART.names("lateness, µs", what, 5.0, &mut text);
+    text + content + "</svg>"
 }
 
 #[cfg(test)]

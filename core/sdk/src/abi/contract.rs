@@ -94,8 +94,8 @@ macro_rules! contract {
                     // SAFETY: the host passes the handle that `make` gave, places that can be written to, and references that live
                     // for the call; it calls a plugin whose methods are not `ref` from one thread at a time.
                     unsafe {
-                        $crate::abi::contract::instance!($access this: T, $plugin, fault);
-                        fault.guard(stringify!($name), answer, error, || $body)
+                        $crate::abi::contract::instance!($access this: T, $plugin, guard);
+                        guard.run_into(stringify!($name), answer, error, || $body)
                     }
                 }
             )+
@@ -140,18 +140,18 @@ macro_rules! contract {
     };
 }
 
-/// The plugin behind a handle and its fault, by names of the caller's.
+/// The plugin behind a handle and its guard, by names of the caller's.
 macro_rules! instance {
-    (ref $this:ident: $type:ty, $plugin:ident, $fault:ident) => {
+    (ref $this:ident: $type:ty, $plugin:ident, $guard:ident) => {
         let $crate::abi::entry::Instance {
             plugin: $plugin,
-            fault: $fault,
+            guard: $guard,
         } = &*$this.cast::<$crate::abi::entry::Instance<$type>>();
     };
-    (mut $this:ident: $type:ty, $plugin:ident, $fault:ident) => {
+    (mut $this:ident: $type:ty, $plugin:ident, $guard:ident) => {
         let $crate::abi::entry::Instance {
             plugin: $plugin,
-            fault: $fault,
+            guard: $guard,
         } = &mut *$this.cast::<$crate::abi::entry::Instance<$type>>();
     };
 }

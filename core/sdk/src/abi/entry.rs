@@ -21,17 +21,18 @@ pub const FAILED: u32 = 1;
 /// A plugin behind a handle.
 pub struct Instance<T> {
     pub plugin: T,
-    pub fault: Fault,
+    pub guard: CallGuard,
 }
 
-/// A plugin's name, and the words of its panic. They are kept for good, so that repeating them needs no memory.
+/// Stands before every call of a plugin: catches its panic, and lets no call through after it. Holds the plugin's name and the
+/// words of the panic, which are kept for good, so that repeating them needs no memory.
 #[derive(Debug)]
-pub struct Fault {
+pub struct CallGuard {
     name: &'static str,
     words: OnceLock<&'static str>,
 }
 
-impl Fault {
+impl CallGuard {
     fn new(name: &'static str) -> Self {
         Self {
             name,
@@ -43,7 +44,7 @@ impl Fault {
     ///
     /// # Safety
     /// `answer` and `error` can be written to.
-    pub unsafe fn guard<R>(
+    pub unsafe fn run_into<R>(
         &self,
         method: &str,
         answer: *mut R,
@@ -181,12 +182,12 @@ pub unsafe fn open<T, O: PluginOptions>(
         let plugin = make(&O::read(text(options))?)?;
         Ok(Box::into_raw(Box::new(Instance {
             plugin,
-            fault: Fault::new(name),
+            guard: CallGuard::new(name),
         }))
         .cast::<c_void>())
     };
     // SAFETY: the caller's promise.
-    unsafe { Fault::new(name).guard("its constructor", handle, error, work) }
+    unsafe { CallGuard::new(name).run_into("its constructor", handle, error, work) }
 }
 
 /// Describes the options `O`, as TOML.
@@ -206,7 +207,7 @@ pub unsafe extern "C" fn describe<O: PluginOptions>(
             .map_err(|e| PluginError::new(e.to_string()))
     };
     // SAFETY: the caller's promise.
-    unsafe { Fault::new("it").guard("the description of its options", answer, error, work) }
+    unsafe { CallGuard::new("it").run_into("the description of its options", answer, error, work) }
 }
 
 /// Closes a plugin. One that has panicked is left as it is: what it would drop may be half made.
@@ -215,13 +216,13 @@ pub unsafe extern "C" fn describe<O: PluginOptions>(
 /// `handle` was given by [`open`] for the same type, and is not used again.
 pub unsafe extern "C" fn close<T>(handle: *mut c_void) {
     // SAFETY: the caller's promise.
-    let Instance { plugin, fault } = unsafe { *Box::from_raw(handle.cast::<Instance<T>>()) };
-    if fault.happened() {
+    let Instance { plugin, guard } = unsafe { *Box::from_raw(handle.cast::<Instance<T>>()) };
+    if guard.happened() {
         std::mem::forget(plugin);
         return;
     }
     if let Err(panic) = catch_unwind(AssertUnwindSafe(|| drop(plugin))) {
-        crate::log!(Error, "{}", fault.keep("drop", panic));
+        crate::log!(Error, "{}", guard.keep("drop", panic));
     }
 }
 

@@ -4,7 +4,7 @@ use std::ffi::c_void;
 use std::mem::MaybeUninit;
 
 use super::contract::contract;
-use super::entry::{Fault, Instance};
+use super::entry::{CallGuard, Instance};
 use super::watch::converting;
 use crate::{AxisVector, Kinematics, KinematicsContext, Made, PluginError};
 
@@ -27,16 +27,16 @@ unsafe extern "C" fn to_joints<T: Kinematics>(
     this: *mut c_void,
     axes: *const AxisVector,
 ) -> AxisVector {
-    let Instance { plugin, fault } = unsafe { &*this.cast::<Instance<T>>() };
-    convert(fault, "to_joints", || plugin.to_joints(unsafe { &*axes }))
+    let Instance { plugin, guard } = unsafe { &*this.cast::<Instance<T>>() };
+    convert(guard, "to_joints", || plugin.to_joints(unsafe { &*axes }))
 }
 
 unsafe extern "C" fn to_axes<T: Kinematics>(
     this: *mut c_void,
     joints: *const AxisVector,
 ) -> AxisVector {
-    let Instance { plugin, fault } = unsafe { &*this.cast::<Instance<T>>() };
-    convert(fault, "to_axes", || plugin.to_axes(unsafe { &*joints }))
+    let Instance { plugin, guard } = unsafe { &*this.cast::<Instance<T>>() };
+    convert(guard, "to_axes", || plugin.to_axes(unsafe { &*joints }))
 }
 
 /// No position at all.
@@ -45,12 +45,12 @@ const NOWHERE: AxisVector = AxisVector([f64::NAN; crate::MAX_AXES]);
 /// Makes a conversion. One that has panicked answers no position: its caller sees that, and asks for its health. The answer
 /// is written where the host wants it: to copy it takes as long as the call.
 #[inline]
-fn convert(fault: &Fault, method: &str, work: impl FnOnce() -> AxisVector) -> AxisVector {
+fn convert(guard: &CallGuard, method: &str, work: impl FnOnce() -> AxisVector) -> AxisVector {
     let mut answer = MaybeUninit::uninit();
     let write = || {
         answer.write(work());
     };
-    match fault.run(method, write) {
+    match guard.run(method, write) {
         // SAFETY: it was written.
         Ok(()) => unsafe { answer.assume_init() },
         Err(_) => NOWHERE,

@@ -6,6 +6,7 @@ use super::layout::layout;
 use super::watch::Method;
 use crate::{
     Answer, FeedStrategy, MAX_SIGNALS, Made, PluginError, Request, Slice, StrategyContext, Window,
+    Words,
 };
 
 contract! {
@@ -13,6 +14,8 @@ contract! {
     feed_strategy: FeedStrategy, FeedStrategy(StrategyContext), StrategyNew, StrategyDrop;
     ref signals(plugin) -> Signals = StrategySignals { Signals::new(plugin.signals()) }
     ref max_ratio_change_per_s(plugin) -> f64 = StrategyMaxRatioChange { Ok(plugin.max_ratio_change_per_s()) }
+    ref takes_override(plugin) -> u32 = StrategyTakesOverride { Ok(u32::from(plugin.takes_override())) }
+    ref explain(plugin) -> Words = StrategyExplain { Ok(plugin.explain()) }
     mut update(plugin, window: *const Window<'_>) -> Reply = StrategyUpdate {
         plugin.update(&*window).map(|answer| Reply::new(&answer))
     }
@@ -108,6 +111,7 @@ impl Reply {
 struct Linked {
     calls: Calls,
     max_ratio_change_per_s: f64,
+    takes_override: bool,
     signals: &'static [&'static str],
 }
 
@@ -121,6 +125,7 @@ pub fn open(
     let calls = Calls::make(table, name, options, context)?;
     let named = calls.signals()?;
     let max_ratio_change_per_s = calls.max_ratio_change_per_s()?;
+    let takes_override = calls.takes_override()? != 0;
     let names = &named.names[..(named.count as usize).min(MAX_SIGNALS)];
     // The contract hands names out for good, and few strategies are opened: their list is never freed.
     let signals = names
@@ -131,6 +136,7 @@ pub fn open(
     Ok(Box::new(Linked {
         calls,
         max_ratio_change_per_s,
+        takes_override,
         signals,
     }))
 }
@@ -142,6 +148,14 @@ impl FeedStrategy for Linked {
 
     fn max_ratio_change_per_s(&self) -> f64 {
         self.max_ratio_change_per_s
+    }
+
+    fn takes_override(&self) -> bool {
+        self.takes_override
+    }
+
+    fn explain(&self) -> Words {
+        self.calls.explain().unwrap_or_default()
     }
 
     fn update(&mut self, window: &Window) -> Result<Answer, PluginError> {

@@ -52,6 +52,8 @@ methods!(
     StrategyDrop = FeedStrategy "drop",
     StrategySignals = FeedStrategy "signals",
     StrategyMaxRatioChange = FeedStrategy "max_ratio_change_per_s",
+    StrategyTakesOverride = FeedStrategy "takes_override",
+    StrategyExplain = FeedStrategy "explain",
     StrategyUpdate = FeedStrategy "update",
     DriverNew = Driver "its constructor",
     DriverDrop = Driver "drop",
@@ -73,7 +75,7 @@ methods!(
 
 /// What a thread says of itself. It alone writes it.
 #[derive(Debug)]
-struct Place {
+struct ThreadStatus {
     /// Number of the [`Method`] that it is in.
     method: AtomicU8,
     /// How often it said that it gets on.
@@ -81,14 +83,14 @@ struct Place {
 }
 
 thread_local! {
-    static PLACE: Place = const { Place { method: AtomicU8::new(0), beats: AtomicU64::new(0) } };
+    static STATUS: ThreadStatus = const { ThreadStatus { method: AtomicU8::new(0), beats: AtomicU64::new(0) } };
     /// Whether it is in a conversion of a kinematics.
     static CONVERTING: Cell<bool> = const { Cell::new(false) };
 }
 
 /// Where a thread is, as another one sees it.
 #[derive(Debug, Default)]
-pub struct Whereabouts(Mutex<Option<&'static Place>>);
+pub struct Whereabouts(Mutex<Option<&'static ThreadStatus>>);
 
 impl Whereabouts {
     /// How often the thread said that it gets on, and the method that it is in. Nowhere, where no thread is watched.
@@ -110,7 +112,7 @@ impl Whereabouts {
 pub fn watch_this_thread(whereabouts: &Arc<Whereabouts>) -> Watched {
     // SAFETY: the place lives as long as its thread. `Watched` cannot leave the thread and takes the reference back; who looks
     // holds the lock while it does so. One that is never dropped is one of a thread that never ends.
-    let place: &'static Place = PLACE.with(|place| unsafe { &*std::ptr::from_ref(place) });
+    let place: &'static ThreadStatus = STATUS.with(|place| unsafe { &*std::ptr::from_ref(place) });
     *whereabouts.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(place);
     Watched {
         whereabouts: Arc::clone(whereabouts),
@@ -138,7 +140,7 @@ impl Drop for Watched {
 /// This thread gets on: a period is over, a block was looked at, a segment was taken. Any loop; does not allocate.
 #[inline]
 pub fn beat() {
-    PLACE.with(|place| {
+    STATUS.with(|place| {
         place
             .beats
             .store(place.beats.load(Relaxed).wrapping_add(1), Relaxed);
@@ -149,7 +151,7 @@ pub fn beat() {
 pub(super) fn is_within() -> bool {
     let of_host =
         [Method::None, Method::FinePeriod, Method::KinematicsConvert].map(|method| method as u8);
-    CONVERTING.get() || PLACE.with(|place| !of_host.contains(&place.method.load(Relaxed)))
+    CONVERTING.get() || STATUS.with(|place| !of_host.contains(&place.method.load(Relaxed)))
 }
 
 /// Makes a conversion of a kinematics. Nobody else sees it: the store that says that it is over would come between the answer and
@@ -166,7 +168,7 @@ pub(super) fn converting<R>(convert: impl FnOnce() -> R) -> R {
 /// show by itself: a fine period, and what asks a kinematics.
 #[inline]
 pub fn calling<R>(method: Method, call: impl FnOnce() -> R) -> R {
-    PLACE.with(|place| {
+    STATUS.with(|place| {
         let before = place.method.load(Relaxed);
         place.method.store(method as u8, Relaxed);
         let answer = call();

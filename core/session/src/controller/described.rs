@@ -6,6 +6,7 @@ use tandem_host::JobOutcome;
 use tandem_machine::Machine;
 
 use super::states::{ControllerState, judge, requests};
+use super::words::WORDS;
 use crate::operator::Position;
 
 /// What became of a job, where the machine stands, and the job as numbers: a summary without its lists, which may be long.
@@ -60,17 +61,37 @@ pub fn machine(machine: &Machine) -> Value {
             (state.name().to_string(), Value::Object(reasons.collect()))
         })
         .collect();
+    let roles: Map<String, Value> = WORDS
+        .iter()
+        .map(|word| (word.name.to_string(), json!(word.role.name())))
+        .collect();
+    let plugin = |what: &str, name: &str| json!({ "what": what, "plugin": name });
+    let mut plugins = vec![
+        plugin("planner", &machine.planner.plugin),
+        plugin("kinematics", &machine.kinematics.plugin),
+    ];
+    let strategy = machine.feed_strategy.iter();
+    plugins.extend(strategy.map(|of| plugin("feed strategy", &of.plugin)));
+    plugins.extend(machine.drivers.iter().map(|driver| {
+        let name = driver.name.as_ref();
+        let what = name.map_or("driver".to_string(), |name| format!("driver {name}"));
+        plugin(&what, &driver.choice.plugin)
+    }));
+    let script = machine.policy.iter();
+    plugins.extend(script.map(|of| plugin("policy", &of.script.display().to_string())));
     let inputs: Vec<_> = machine.inputs.iter().map(|input| &input.name).collect();
     let outputs: Vec<_> = machine.outputs.iter().map(|output| &output.name).collect();
     json!({
         "machine": machine.name,
         "axes": axes,
+        "plugins": plugins,
         "fine_period_s": machine.fine_period_s,
         "jog_keep_alive_s": machine.operator.jog_keep_alive_s,
         "max_feed_ratio": machine.motion.max_feed_ratio,
         "inputs": inputs,
         "outputs": outputs,
         "requests": requests().collect::<Vec<_>>(),
+        "roles": roles,
         "refused": refused,
     })
 }

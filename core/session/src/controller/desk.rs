@@ -1,4 +1,4 @@
-//! Where all requests come together: what is done at once is done here, the rest is ordered of the loop that drives.
+//! Where all requests come together: what is true of the machine and its jobs, and who is told of it.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -6,30 +6,29 @@ use std::io::Write as _;
 use std::os::unix::net::UnixStream;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering::{Acquire, Relaxed, Release};
-use std::sync::atomic::{AtomicBool, AtomicI64};
+use std::sync::atomic::{AtomicBool, AtomicI64, AtomicUsize};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::SystemTime;
 
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use tandem_gcode::Lasting;
-use tandem_host::{Command, JobOutcome};
+use tandem_host::JobOutcome;
 use tandem_machine::Machine;
 use tandem_rings::{MachineState, Status, Switched};
 use tandem_sdk::AxisVector;
 use tandem_state::{Change, Outcome};
 
+use super::arrivals::Arrivals;
 use super::described;
-use super::history::{HELD, History, alarm_shown};
+use super::history::{History, alarm_shown};
 use super::keeper::Keeper;
 use super::lines::{Judged, SharedLines, lock};
 use super::path::DrawnPath;
-use super::programs::{Upload, discard};
-use super::request::Asked;
+use super::programs::Upload;
 use super::scope::Scope;
-use super::states::{ControllerState, judge};
-use super::words::word_of;
-use crate::jog::{JogController, JogMessage, ReachMessage};
+use super::states::ControllerState;
+use crate::jog::JogController;
 use crate::operator::OperatorHub;
 
 /// Longest program, bytes.
@@ -102,6 +101,53 @@ pub enum Order {
     },
 }
 
+impl Order {
+    /// Who is answered when it has begun, or will not.
+    pub fn from(&self) -> Option<From> {
+        match self {
+            Self::Check { from, .. }
+            | Self::Start { from }
+            | Self::Home { from, .. }
+            | Self::Enable { from, .. }
+            | Self::Disable { from }
+            | Self::SetPolicyParameter { from, .. } => Some(*from),
+            Self::Mdi | Self::JogLines | Self::Jog => None,
+        }
+    }
+
+    /// Whether something moves by it, or holds.
+    fn moves(&self) -> bool {
+        self.drives().is_some() || matches!(self, Self::Enable { .. } | Self::Disable { .. })
+    }
+
+    /// What is driven by it; none where it moves nothing.
+    fn drives(&self) -> Option<Mode> {
+        match self {
+            Self::Start { .. } => Some(Mode::Program),
+            Self::Home { .. } => Some(Mode::Homing),
+            Self::Mdi => Some(Mode::Mdi),
+            Self::JogLines | Self::Jog => Some(Mode::Jog),
+            _ => None,
+        }
+    }
+}
+
+impl Inner {
+    /// What is driven, or is about to be: a program is checked before it begins, and can be held and stopped meanwhile.
+    fn mode_to_come(&self) -> Mode {
+        let ordered = self.order.as_ref().and_then(Order::drives);
+        match self.mode {
+            Mode::Idle if self.enabled => ordered.unwrap_or(Mode::Idle),
+            mode => mode,
+        }
+    }
+
+    /// Whether nothing is driven, and something is about to be.
+    pub fn is_about_to_move(&self) -> bool {
+        self.mode == Mode::Idle && self.mode_to_come() != Mode::Idle
+    }
+}
+
 /// A program that can be started.
 #[derive(Clone, Debug)]
 pub struct Loaded {
@@ -133,6 +179,14 @@ pub struct Seen {
     pub switched: Switched,
 }
 
+/// What lasts, as far as clients change it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Books {
+    Closed,
+    /// It is being written: nothing is begun meanwhile.
+    Written,
+}
+
 /// What is asked for, and what became of it.
 pub struct Inner {
     pub mode: Mode,
@@ -144,9 +198,14 @@ pub struct Inner {
     /// The fault that the machine stands in, and whether it is an emergency stop.
     pub fault: Option<(String, bool)>,
     pub aborting: bool,
+    /// So many stops were asked for that end what is driven.
+    pub stops: u64,
+    pub books: Books,
     pub history: History,
     /// Parameters of the policy script, as the next job has them.
     pub policy_parameters: BTreeMap<String, f64>,
+    /// What the policy script declares, as it is told.
+    pub declared_parameters: Vec<Value>,
     last_state: Option<ControllerState>,
 }
 
@@ -159,8 +218,14 @@ pub struct Desk {
     pub jogs: Arc<JogController>,
     pub keeper: Box<dyn Keeper>,
     pub programs: Option<PathBuf>,
+    /// The drives are on a bus, whose frames may be late or lost.
+    pub has_bus: bool,
+    /// Where what clients say is written, where it is.
+    pub arrivals: Option<Arrivals>,
     inner: Mutex<Inner>,
-    upload: Mutex<Option<Upload>>,
+    pub(super) upload: Mutex<Option<Upload>>,
+    /// Threads that wait for a disk.
+    pub(super) clerks: Arc<AtomicUsize>,
     path: Mutex<DrawnPath>,
     scope: Mutex<Scope>,
     seen: Mutex<Seen>,
@@ -202,8 +267,11 @@ impl Desk {
             block_delete: false,
             fault: None,
             aborting: false,
+            stops: 0,
+            books: Books::Closed,
             history: History::of(&keeper.remembered()),
             policy_parameters: BTreeMap::new(),
+            declared_parameters: vec![],
             last_state: None,
         };
         Ok(Self {
@@ -214,8 +282,11 @@ impl Desk {
             jogs,
             keeper,
             programs,
+            has_bus: false,
+            arrivals: None,
             inner: Mutex::new(inner),
             upload: Mutex::default(),
+            clerks: Arc::default(),
             path: Mutex::new(DrawnPath::new(machine.axes)),
             scope: Mutex::new(Scope::new(machine)),
             seen: Mutex::default(),
@@ -283,15 +354,6 @@ impl Desk {
         }
     }
 
-    /// A client is gone.
-    pub fn forget(&self, client: u64) {
-        self.scope().forget(client);
-        let mut pending = self.pending();
-        if pending.as_ref().is_some_and(|upload| upload.is_by(client)) {
-            discard(&mut pending);
-        }
-    }
-
     /// The machine is to come to rest and its drives are to let go, for good.
     pub fn end(&self) {
         self.over.store(true, Release);
@@ -299,6 +361,13 @@ impl Desk {
 
     pub fn is_over(&self) -> bool {
         self.over.load(Acquire)
+    }
+
+    /// What a client does is written, where that is asked for.
+    pub fn note(&self, write: impl FnOnce(&Arrivals) -> Option<String>) {
+        if let Some(why) = self.arrivals.as_ref().and_then(write) {
+            self.raise("arrivals", &why);
+        }
     }
 
     /// Sends a line to a client, or to all.
@@ -311,7 +380,7 @@ impl Desk {
     }
 
     /// Wakes the thread that serves the clients; where it rings already, it rings.
-    fn ring(&self) {
+    pub(super) fn ring(&self) {
         let _ = (&self.bell.1).write(&[1]);
     }
 
@@ -378,9 +447,11 @@ impl Desk {
             MachineState::from_number(self.status.state.load(Relaxed)) == MachineState::Stopping;
         let held = controls.hold.load(Relaxed) || controls.program_hold.load(Relaxed);
         let homing_needed = inner.unknown_axes != 0;
-        match inner.mode {
+        match inner.mode_to_come() {
             Mode::Enabling => ControllerState::Stopping,
             Mode::Idle if !inner.enabled => ControllerState::Disabled,
+            // The loop that drives has not looked yet.
+            Mode::Idle if controls.emergency_stop.load(Relaxed) => ControllerState::Stopping,
             Mode::Idle if homing_needed => ControllerState::HomingNeeded,
             Mode::Idle => ControllerState::Ready,
             _ if stops || ramps || inner.aborting => ControllerState::Stopping,
@@ -405,209 +476,31 @@ impl Desk {
         }
     }
 
-    /// Judges a request by the state of the machine, and does it or orders it.
-    pub fn ask(&self, from: From, asked: &Asked) -> Answered {
-        let name = if asked.request == "jog" && asked.with.contains_key("stop") {
-            "jog-stop"
-        } else {
-            &asked.request
-        };
-        if let Some(answer) = self.ask_disk(from, asked, name) {
-            return Some(answer);
-        }
+    /// A job begins; `false` where a stop came while it was being made: it is not to begin. The loop that drives.
+    #[must_use]
+    pub fn begin(&self, mode: Mode) -> bool {
         let mut inner = self.lock();
-        if let Err(why) = fits(self.state_of(&inner), asked, name) {
-            return Some(Err(why));
+        inner.order = None;
+        if std::mem::take(&mut inner.aborting) {
+            return false;
         }
-        let joins = matches!(
-            (&inner.order, name),
-            (Some(Order::Mdi), "mdi") | (Some(Order::Jog), "jog" | "jog-stop")
-        );
-        if inner.order.is_some() && !joins && begins_or_sets(name) {
-            return Some(Err(
-                "another request is being begun: wait for its answer".to_string()
-            ));
-        }
-        let order = match self.act(from, asked, name, &mut inner) {
-            Ok(Acted::Done(value)) => return Some(Ok(value)),
-            Err(why) => return Some(Err(why)),
-            Ok(Acted::Begins(order, value)) => (order, Some(Ok(value))),
-            Ok(Acted::Ordered(order)) => (order, None),
-        };
-        inner.order = Some(order.0);
-        order.1
-    }
-
-    /// What waits for a disk while a job may be driven: the loop that drives never waits for that.
-    fn ask_disk(&self, from: From, asked: &Asked, name: &str) -> Option<Result<Value, String>> {
-        if !["list", "upload", "acknowledge"].contains(&name) {
-            return None;
-        }
-        Some(fits(self.state(), asked, name).and_then(|()| match name {
-            "list" => self.list(),
-            "upload" => self.upload(from, asked, &mut self.pending()),
-            _ => self.acknowledge(asked),
-        }))
-    }
-
-    /// The program that is on its way into the folder.
-    fn pending(&self) -> MutexGuard<'_, Option<Upload>> {
-        self.upload.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn act(
-        &self,
-        from: From,
-        asked: &Asked,
-        name: &str,
-        inner: &mut Inner,
-    ) -> Result<Acted, String> {
-        let give = |command: Command| {
-            self.hub
-                .give(command)
-                .map(|tick| Acted::Done(json!({ "tick": tick })))
-        };
-        match name {
-            "status" => Ok(Acted::Done(self.status_of(inner))),
-            "history" => {
-                let count = asked.whole_if_any("count").unwrap_or(HELD as u64);
-                Ok(Acted::Done(inner.history.show(count as usize)))
-            }
-            "alarms" => Ok(Acted::Done(
-                json!({ "alarms": inner.history.open_alarms() }),
-            )),
-            "machine" => Ok(Acted::Done(described::machine(&self.machine))),
-            "tables" => {
-                let lasting = lock(&self.lines).standing().lasting();
-                Ok(Acted::Done(described::tables(&self.machine, &lasting)))
-            }
-            "path" => {
-                let from = |key: &str| asked.whole_if_any(key).unwrap_or(0);
-                Ok(Acted::Done(
-                    self.path().show(from("from"), from("driven_from")),
-                ))
-            }
-            "scope" => self.scope().watch(from.client, asked).map(Acted::Done),
-            "capture" => self.scope().arm(from.client, asked).map(Acted::Done),
-            "captured" => {
-                let first = asked.whole_if_any("from").unwrap_or(0) as usize;
-                self.scope().captured(from.client, first).map(Acted::Done)
-            }
-            "policy-parameters" => Ok(Acted::Done(
-                json!({ "parameters": inner.policy_parameters }),
-            )),
-            "set-policy-parameter" => Ok(Acted::Ordered(Order::SetPolicyParameter {
-                from,
-                name: asked.text("name")?.to_string(),
-                value: asked.number("value")?,
-            })),
-            "hold" => give(Command::Hold),
-            "resume" => give(Command::Resume),
-            "emergency-stop" => give(Command::EmergencyStop),
-            "abort" => {
-                let done = give(Command::Abort)?;
-                inner.aborting = true;
-                self.jogs.forget();
-                Ok(done)
-            }
-            "feed-override" => asked
-                .number("ratio")
-                .and_then(ratio)
-                .and_then(|r| give(Command::FeedOverride(r))),
-            "rapid-override" => asked
-                .number("ratio")
-                .and_then(ratio)
-                .and_then(|r| give(Command::RapidOverride(r))),
-            "single-block" => give(Command::SingleBlock(asked.on()?)),
-            "optional-stop" => give(Command::OptionalStop(asked.on()?)),
-            "block-delete" => {
-                inner.block_delete = asked.on()?;
-                Ok(Acted::Done(json!({ "block_delete": inner.block_delete })))
-            }
-            "load" | "check" => {
-                let program = self.program_of(asked)?;
-                Ok(Acted::Ordered(Order::Check {
-                    from,
-                    program,
-                    load: name == "load",
-                }))
-            }
-            "start" => {
-                let missing = "no program is loaded: \"load\" loads one";
-                inner
-                    .loaded
-                    .as_ref()
-                    .map(|_| Acted::Ordered(Order::Start { from }))
-                    .ok_or_else(|| missing.to_string())
-            }
-            "mdi" => {
-                let taken = lock(&self.lines)
-                    .judge(from.client, from.id, asked.text("line")?)
-                    .map_err(|why| why.to_string())?;
-                let judged = json!({ "judged": true });
-                let waits = inner.mode == Mode::Mdi || inner.order.is_some() || !taken.begins;
-                Ok(if waits {
-                    Acted::Done(judged)
-                } else {
-                    Acted::Begins(Order::Mdi, judged)
-                })
-            }
-            "jog-stop" => {
-                self.jogs.let_go();
-                Ok(Acted::Done(json!({ "jog": "stop" })))
-            }
-            "jog" => {
-                let jog = jog(asked)?.on(&self.machine.axes)?;
-                if asked.is_on("again") {
-                    self.jogs.keep_alive(jog)?;
-                    return Ok(Acted::Done(json!({ "jog": asked.with.get("axis") })));
-                }
-                self.jogs.ask(jog)?;
-                let done = json!({ "jog": asked.with.get("axis") });
-                let waits = inner.mode == Mode::Jog || inner.order.is_some();
-                Ok(if waits {
-                    Acted::Done(done)
-                } else {
-                    Acted::Begins(Order::Jog, done)
-                })
-            }
-            "home" => {
-                let axis = asked.text_if_any("axis").map(|axis| self.axis(axis));
-                Ok(Acted::Ordered(Order::Home {
-                    from,
-                    axis: axis.transpose()?,
-                }))
-            }
-            "reset" => Ok(Acted::Ordered(Order::Enable { from, resets: true })),
-            "enable" => Ok(Acted::Ordered(Order::Enable {
-                from,
-                resets: false,
-            })),
-            "disable" => Ok(Acted::Ordered(Order::Disable { from })),
-            "touch-off" | "set-offset" | "set-tool" | "set-parameter" => {
-                self.set(asked, name).map(Acted::Done)
-            }
-            other => Err(format!("{other} is not done here")),
-        }
-    }
-
-    fn axis(&self, letter: &str) -> Result<usize, String> {
-        let mut letters = letter.chars();
-        let one = letters
-            .next()
-            .filter(|_| letters.next().is_none())
-            .map(|letter| letter.to_ascii_uppercase());
-        one.and_then(|one| self.machine.axes.index(one))
-            .ok_or_else(|| format!("the machine has no axis {letter}"))
-    }
-
-    /// A job begins. The loop that drives.
-    pub fn begin(&self, mode: Mode) {
-        let mut inner = self.lock();
-        (inner.mode, inner.order, inner.aborting) = (mode, None, false);
+        inner.mode = mode;
         drop(inner);
         *self.seen() = Seen::default();
         self.hub.begin_job();
+        self.tell_state();
+        true
+    }
+
+    /// What was ordered is not begun: lines that wait for it are not going to be driven, and a hold that it was to begin with is over.
+    /// The loop that drives.
+    pub fn give_up_order(&self, position: AxisVector) {
+        let mut inner = self.lock();
+        (inner.order, inner.aborting) = (None, false);
+        drop(inner);
+        self.hub.controls().hold.store(false, Relaxed);
+        let dropped = lock(&self.lines).end_job(position, false, false, false);
+        self.tell_driven(&dropped, false);
         self.tell_state();
     }
 
@@ -647,6 +540,8 @@ impl Desk {
             self.fault_in(&mut inner, words);
         }
         let ended = inner.history.end(outcome, how, self.now_unix_ms());
+        // Before anybody can ask for the next jog: one that is asked for behind this is not to be forgotten.
+        self.stands(&outcome.position, unknown_axes);
         (inner.mode, inner.unknown_axes, inner.aborting) = (Mode::Idle, unknown_axes, false);
         inner.enabled = outcome.fault.is_none() && (mode != Mode::Enabling || !outcome.aborted);
         drop(inner);
@@ -659,7 +554,6 @@ impl Desk {
             });
             self.send(None, &described::job_event(&self.machine, &job, outcome));
         }
-        self.stands(&outcome.position, unknown_axes);
         self.tell_state();
     }
 
@@ -689,9 +583,15 @@ impl Desk {
     pub fn fault(&self, words: &str) {
         let mut inner = self.lock();
         (inner.mode, inner.aborting) = (Mode::Idle, false);
+        let order = inner.order.take_if(|order| order.moves());
         self.fault_in(&mut inner, words);
         drop(inner);
-        lock(&self.lines).end_job(self.hub.position(), false, false, true);
+        let dropped = lock(&self.lines).end_job(self.hub.position(), false, false, true);
+        self.tell_driven(&dropped, false);
+        // What was about to begin does not begin in a fault.
+        if let Some(from) = order.and_then(|order| order.from()) {
+            self.answer(from, Err(words.to_string()));
+        }
         self.tell_state();
     }
 
@@ -702,76 +602,4 @@ impl Desk {
             self.send(Some(line.client), &json!({ "event": event, "id": line.id }));
         }
     }
-}
-
-/// What became of a request that was granted.
-enum Acted {
-    /// Done, with the answer.
-    Done(Value),
-    /// Done, and a job begins for it.
-    Begins(Order, Value),
-    /// The loop that drives answers.
-    Ordered(Order),
-}
-
-/// Whether a request fits the state, and has the keys that its word asks for.
-fn fits(state: ControllerState, asked: &Asked, name: &str) -> Result<(), String> {
-    judge(state, name)?;
-    word_of(name).map_or(Ok(()), |word| word.check(&asked.with))
-}
-
-/// Whether a request begins a job or changes what one begins with: one at a time.
-fn begins_or_sets(name: &str) -> bool {
-    [
-        "load",
-        "check",
-        "start",
-        "mdi",
-        "jog",
-        "home",
-        "reset",
-        "enable",
-        "disable",
-        "touch-off",
-        "set-offset",
-        "set-tool",
-        "set-parameter",
-        "set-policy-parameter",
-        "resume",
-    ]
-    .contains(&name)
-}
-
-fn ratio(value: f64) -> Result<f64, String> {
-    if value.is_finite() && value >= 0.0 {
-        Ok(value)
-    } else {
-        Err(format!("{value} is not a number of zero or more"))
-    }
-}
-
-/// A jog as clients ask for it.
-fn jog(asked: &Asked) -> Result<JogMessage, String> {
-    let axis = asked
-        .text("axis")?
-        .chars()
-        .next()
-        .ok_or("jog needs an axis")?;
-    let degrees = asked.with.contains_key("feed_deg_per_min");
-    let unit = if degrees { "deg" } else { "mm" };
-    let feed_per_min = asked.number(&format!("feed_{unit}_per_min"))?;
-    let distance = asked.number_if_any(&format!("distance_{unit}"))?;
-    let reach = match (distance, asked.number_if_any("direction")?) {
-        (Some(distance), None) => ReachMessage::By(distance),
-        (None, Some(direction)) if direction.abs() == 1.0 => ReachMessage::On {
-            positive: direction > 0.0,
-        },
-        _ => return Err("jog needs one of distance and direction (1 or -1)".to_string()),
-    };
-    Ok(JogMessage {
-        axis,
-        reach,
-        feed_per_min,
-        degrees: Some(degrees),
-    })
 }

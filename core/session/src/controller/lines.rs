@@ -10,7 +10,7 @@ use tandem_rough::Source;
 use tandem_sdk::{AxisVector, Block, BlockKind, EventKind, Planner};
 
 use super::desk::Order;
-use crate::judge::{LineJudge, Refusal};
+use crate::judge::{JudgedLine, LineJudge, Refusal};
 use crate::standing::Standing;
 
 /// Lines that may wait before they are planned.
@@ -34,6 +34,10 @@ pub struct Judged {
 )]
 pub struct Lines {
     judge: LineJudge,
+    /// Judges lines that read files, while nobody holds the lines.
+    files: Arc<Mutex<LineJudge>>,
+    /// Grows whenever a line that is being judged would have to be judged anew.
+    turn: u64,
     /// Modes, offsets, parameters and tools as the path has made them true.
     standing: Interpreter,
     /// The same behind the last line that was judged.
@@ -55,6 +59,24 @@ pub struct Lines {
     /// What the last probe has found.
     probed: Option<Probed>,
     stands: Standing,
+}
+
+/// A line that is being judged while nobody holds the lines.
+pub struct Call {
+    before: Interpreter,
+    number: u32,
+    turn: u64,
+}
+
+impl Call {
+    /// Judges it. It reads files, and may take as long as they do.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn judge(&self, files: &Mutex<LineJudge>, text: &str) -> Result<JudgedLine, Refusal> {
+        let judge = files.lock().unwrap_or_else(PoisonError::into_inner);
+        judge.judge(&self.before, self.number, text)
+    }
 }
 
 /// Where a probe has come to.
@@ -80,15 +102,10 @@ pub struct TakenLine {
     pub ends: bool,
 }
 
-/// Whether it ends a program.
-fn ends(item: &Item) -> bool {
-    matches!(item, Item::Event(event) if event.kind == EventKind::ProgramEnd)
-}
-
 /// What a line asks for where it does not only move and switch.
 fn rests(item: &Item) -> bool {
     match item {
-        Item::Block(block, _) => block.kind == BlockKind::Dwell || item.is_probe(),
+        Item::Block(block, _) => block.dwell_s > 0.0 || item.is_probe(),
         Item::Event(event) => matches!(
             event.kind,
             EventKind::ProgramStop
@@ -98,6 +115,14 @@ fn rests(item: &Item) -> bool {
         ),
         _ => true,
     }
+}
+
+/// Whether a line asks for a rest and nothing else: G4 P0, by which senders wait for the machine. Beside what it switches a rest is
+/// only on the way.
+fn only_rests(items: &[Item]) -> bool {
+    let is_dwell =
+        |item: &Item| matches!(item, Item::Block(block, _) if block.kind == BlockKind::Dwell);
+    !items.is_empty() && items.iter().all(is_dwell)
 }
 
 /// Shared lines.
@@ -111,10 +136,17 @@ pub fn lock(lines: &SharedLines) -> MutexGuard<'_, Lines> {
 
 impl Lines {
     /// Nothing was said yet; `standing` is what has lasted. Host; allocates.
-    pub fn new(machine: &Machine, judge: Box<dyn Planner>, mut standing: Interpreter) -> Self {
+    pub fn new(
+        machine: &Machine,
+        judges: [Box<dyn Planner>; 2],
+        mut standing: Interpreter,
+    ) -> Self {
         standing.set_file("input");
+        let [judge, files] = judges.map(|judge| LineJudge::new(machine.clone(), judge));
         Self {
-            judge: LineJudge::new(machine.clone(), judge),
+            judge,
+            files: Arc::new(Mutex::new(files)),
+            turn: 0,
             ahead: standing.clone(),
             standing,
             told: None,
@@ -165,19 +197,28 @@ impl Lines {
         self.probed
     }
 
-    /// Lines that wait are never driven; what is driven goes on.
-    pub fn forget_waiting(&mut self) {
+    /// Lines that wait are never driven, and are the answer; what is driven goes on.
+    #[must_use]
+    pub fn forget_waiting(&mut self) -> Vec<Judged> {
+        self.turn += 1;
+        let forgotten = self.judged.split_off(self.count_taken());
         self.waiting.clear();
         self.asks &= self.driving;
         if !self.driving {
             self.ledger.forget();
-            self.judged.clear();
             self.ahead = self.standing.clone();
         }
+        forgotten.into()
+    }
+
+    /// How many of the judged lines the planner has taken: those that wait are the last ones.
+    fn count_taken(&self) -> usize {
+        self.judged.len().saturating_sub(self.waiting.len())
     }
 
     /// Modes are as at the start of a program; nothing is driven.
     pub fn reset_modes(&mut self) {
+        self.turn += 1;
         self.standing.reset_modes();
         self.ahead = self.standing.clone();
     }
@@ -187,16 +228,7 @@ impl Lines {
     /// # Errors
     /// What is wrong with it.
     pub fn check(&self, before: &Interpreter, text: &str) -> Result<Interpreter, Refusal> {
-        let (mut behind, items) = self.judge.judge(before, 1, text)?;
-        if items.iter().any(Item::is_probe) {
-            // Nobody answers: the probe is taken to end where it is programmed to.
-            let rest = behind.position();
-            behind.provide_probe(&ProbeResult {
-                touched: None,
-                rest,
-            });
-        }
-        Ok(behind)
+        checked(&self.judge, before, text)
     }
 
     /// Modes, offsets, parameters and tools as they are.
@@ -206,6 +238,7 @@ impl Lines {
 
     /// What lasts is otherwise from here on; nothing is driven.
     pub fn set_lasting(&mut self, lasting: &Lasting) {
+        self.turn += 1;
         self.standing.set_lasting(lasting);
         self.ahead = self.standing.clone();
     }
@@ -228,6 +261,68 @@ impl Lines {
     /// # Errors
     /// What is wrong with it: nothing has changed.
     pub fn judge(&mut self, client: u64, id: u64, text: &str) -> Result<TakenLine, Refusal> {
+        let begins = self.prepare_line()?;
+        let number = self.count + 1;
+        let first_block = self.ahead.next_block();
+        let judged = self.judge.judge(&self.ahead, number, text)?;
+        self.jogs = false;
+        self.take(client, id, first_block, judged, begins)
+    }
+
+    /// Whether a line calls a subroutine, whose file is read when it is judged.
+    pub fn calls(&self, text: &str) -> bool {
+        self.ahead.calls(text.as_bytes())
+    }
+
+    /// Who judges lines that read files.
+    pub fn files(&self) -> Arc<Mutex<LineJudge>> {
+        Arc::clone(&self.files)
+    }
+
+    /// Begins to judge a line that reads files: [`Call::judge`] goes on when nobody holds the lines.
+    ///
+    /// # Errors
+    /// No line can be taken now.
+    pub fn begin_call(&mut self) -> Result<Call, Refusal> {
+        self.prepare_line()?;
+        Ok(Call {
+            before: self.ahead.clone(),
+            number: self.count + 1,
+            turn: self.turn,
+        })
+    }
+
+    /// Takes a line that was judged by `call`; none where it is to be judged anew, behind what has come meanwhile.
+    pub fn end_call(
+        &mut self,
+        (client, id): (u64, u64),
+        call: &Call,
+        judged: JudgedLine,
+    ) -> Option<Result<TakenLine, Refusal>> {
+        if self.turn != call.turn {
+            return None;
+        }
+        let begins = !self.is_at_work();
+        let first_block = call.before.next_block();
+        self.jogs = false;
+        Some(self.take(client, id, first_block, judged, begins))
+    }
+
+    /// A call judged where nothing is driven: what is true behind it.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn check_call(
+        files: &Mutex<LineJudge>,
+        before: &Interpreter,
+        text: &str,
+    ) -> Result<Interpreter, Refusal> {
+        let judge = files.lock().unwrap_or_else(PoisonError::into_inner);
+        checked(&judge, before, text)
+    }
+
+    /// Sees to it that a line that is no jog can be judged; whether a job is to begin for it.
+    fn prepare_line(&mut self) -> Result<bool, Refusal> {
         if self.asks {
             let why =
                 "the line before waits for an input or a probe: send this one when it is driven";
@@ -236,12 +331,7 @@ impl Lines {
         if self.jogs && self.is_at_work() {
             return Err(Refusal::of("jogs", "the machine is jogged"));
         }
-        let begins = self.prepare()?;
-        let number = self.count + 1;
-        let first_block = self.ahead.next_block();
-        let (tried, items) = self.judge.judge(&self.ahead, number, text)?;
-        self.jogs = false;
-        self.take(client, id, first_block, tried, items, begins)
+        self.prepare()
     }
 
     /// Judges a jog, words as of G1 that hold for themselves alone, and takes it.
@@ -267,19 +357,19 @@ impl Lines {
         let modes = before.moment_since(&mut None);
         let first_block = before.next_block();
         let text = format!("G94 G1 {words}");
-        let (mut tried, items) = self.judge.judge(&before, self.count + 1, &text)?;
+        let mut judged = self.judge.judge(&before, self.count + 1, &text)?;
         let mut at = before.position();
-        for item in &items {
+        for item in &judged.items {
             if let Item::Block(block, _) = item {
                 allows(&at, block)?;
                 at = block.end;
             }
         }
         if let Some(modes) = modes {
-            tried.take_up(modes);
+            judged.behind.take_up(modes);
         }
         self.jogs = true;
-        self.take(client, id, first_block, tried, items, begins)
+        self.take(client, id, first_block, judged, begins)
     }
 
     /// Sees to it that a line can be judged; whether a job is to begin for it.
@@ -305,13 +395,17 @@ impl Lines {
         client: u64,
         id: u64,
         first_block: u64,
-        mut tried: Interpreter,
-        items: Vec<Item>,
+        judged: JudgedLine,
         begins: bool,
     ) -> Result<TakenLine, Refusal> {
-        let rests = items.iter().any(rests);
+        self.turn += 1;
+        let JudgedLine {
+            behind: mut tried,
+            items,
+            ends,
+        } = judged;
+        let rests = items.iter().any(rests) || only_rests(&items);
         let asks_probe = items.iter().any(Item::is_probe);
-        let ends = items.iter().any(ends);
         if ends {
             tried.reset_modes();
         }
@@ -382,8 +476,8 @@ impl Lines {
     }
 
     /// The job is over, and the machine stands at `position`; `whole` where all that was read is driven, and `ended` where a
-    /// program has come to its end, behind which modes are as at the start. What is on was `switched_off` otherwise. Lines that
-    /// were taken: driven where whole, else not.
+    /// program has come to its end, behind which modes are as at the start. What is on was `switched_off` otherwise. The answer
+    /// are the lines that are over: driven where whole, else not.
     pub fn end_job(
         &mut self,
         position: AxisVector,
@@ -391,6 +485,7 @@ impl Lines {
         ended: bool,
         switched_off: bool,
     ) -> Vec<Judged> {
+        self.turn += 1;
         let goes_on = whole && !self.waiting.is_empty();
         if whole && !goes_on {
             self.ledger.reach_all();
@@ -410,11 +505,27 @@ impl Lines {
         self.stands.moves();
         self.asks &= goes_on;
         if goes_on {
-            return vec![];
+            return self.judged.drain(..self.count_taken()).collect();
         }
         self.ahead = self.standing.clone();
         self.judged.drain(..).collect()
     }
+}
+
+/// Judges a line and drives nothing.
+fn checked(judge: &LineJudge, before: &Interpreter, text: &str) -> Result<Interpreter, Refusal> {
+    let JudgedLine {
+        mut behind, items, ..
+    } = judge.judge(before, 1, text)?;
+    if items.iter().any(Item::is_probe) {
+        // Nobody answers: the probe is taken to end where it is programmed to.
+        let rest = behind.position();
+        behind.provide_probe(&ProbeResult {
+            touched: None,
+            rest,
+        });
+    }
+    Ok(behind)
 }
 
 /// The lines as the rough loop pulls them.
@@ -457,6 +568,7 @@ impl Source for LineSource {
 
     fn provide_input(&mut self, value: f64) {
         let mut inner = lock(&self.0);
+        inner.turn += 1;
         // It is true now, and lasts behind the job.
         inner.standing.provide_input(value);
         inner.ahead.provide_input(value);
@@ -465,6 +577,7 @@ impl Source for LineSource {
 
     fn provide_rest(&mut self, rest: &Rest) -> bool {
         let mut inner = lock(&self.0);
+        inner.turn += 1;
         match rest.cause {
             RestCause::Attached => true,
             RestCause::Abort => {

@@ -1,6 +1,9 @@
 //! The controller that stays: one machine, job after job, and what lasts between them. Its protocol is a JSON line a request,
 //! on every door.
 
+mod arrivals;
+mod ask;
+mod clerk;
 mod described;
 mod desk;
 mod history;
@@ -22,6 +25,7 @@ mod talk;
 mod watch;
 mod words;
 
+pub(crate) use clerk::Clerk;
 pub(crate) use desk::{Desk, From, Mode};
 pub use keeper::{Keeper, NoKeeper, Remembered};
 pub(crate) use lines::{Lines, TakenLine};

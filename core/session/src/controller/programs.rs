@@ -41,9 +41,11 @@ impl Desk {
             ));
         }
         let file = folder.join(path);
-        let size = fs::metadata(&file)
-            .map_err(|e| format!("{}: {e}", file.display()))?
-            .len();
+        let of = fs::metadata(&file).map_err(|e| format!("{}: {e}", file.display()))?;
+        if !of.is_file() {
+            return Err(format!("{path}: it is no file"));
+        }
+        let size = of.len();
         if size > MAX_PROGRAM_BYTES {
             return Err(format!(
                 "{path}: it has {size} bytes, {MAX_PROGRAM_BYTES} are allowed"

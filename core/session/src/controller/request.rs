@@ -40,6 +40,20 @@ pub fn read(text: &str) -> Result<Asked, (Option<u64>, String)> {
 }
 
 impl Asked {
+    /// The name of its row: the stop of a jog has one of its own.
+    pub fn name(&self) -> &str {
+        if self.request == "jog" && self.with.contains_key("stop") {
+            "jog-stop"
+        } else {
+            &self.request
+        }
+    }
+
+    /// Whether it stops what moves: it waits for nothing.
+    pub fn is_stop(&self) -> bool {
+        ["hold", "abort", "emergency-stop", "jog-stop"].contains(&self.name())
+    }
+
     /// The text of `key`.
     ///
     /// # Errors

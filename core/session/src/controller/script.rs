@@ -1,4 +1,4 @@
-//! Who speaks to a controller on the virtual clock: lines of a script by their ticks, and senders in this process that answer to
+//! Clients of a controller on the virtual clock: lines of a script by their ticks, and senders in this process that answer to
 //! what they hear.
 
 use std::collections::{BTreeMap, VecDeque};
@@ -14,8 +14,8 @@ use super::talk::Protocol2;
 use crate::grbl::{Sender, Settings};
 use crate::operator::{Lease, Talk};
 
-/// Senders that came by [`super::Controller::attend`] have numbers from this one on.
-const FIRST_ATTENDED: u64 = 1 << 32;
+/// Senders that were added by [`super::Controller::add_sender`] have numbers from this one on.
+const FIRST_ADDED: u64 = 1 << 32;
 
 /// A sender of grbl's protocol in this process, on the virtual clock.
 pub trait VirtualSender: Send {
@@ -23,16 +23,16 @@ pub trait VirtualSender: Send {
     fn period(&mut self, uptime_periods: u64, heard: &str, say: &mut Vec<u8>) -> bool;
 }
 
-struct Attended {
+struct AddedSender {
     number: u64,
     sender: Box<dyn VirtualSender>,
 }
 
-/// Everybody who speaks.
+/// The clients of a controller on the virtual clock.
 pub struct Script {
     pub lines: VecDeque<ScriptLine>,
     clients: BTreeMap<u64, Box<dyn Talk>>,
-    attended: Vec<Attended>,
+    senders: Vec<AddedSender>,
     /// What senders have heard since they were asked last.
     heard: BTreeMap<u64, String>,
     lease: Lease,
@@ -45,7 +45,7 @@ impl Script {
         Self {
             lines: lines.into(),
             clients: BTreeMap::new(),
-            attended: vec![],
+            senders: vec![],
             heard: BTreeMap::new(),
             lease: Lease::default(),
             settings: Arc::default(),
@@ -55,17 +55,17 @@ impl Script {
 
     /// Whether nobody has anything left to say.
     pub fn is_over(&self) -> bool {
-        self.lines.is_empty() && self.attended.is_empty()
+        self.lines.is_empty() && self.senders.is_empty()
     }
 
-    /// Somebody comes in.
-    pub fn attend(&mut self, desk: &Arc<Desk>, sender: Box<dyn VirtualSender>) {
-        let number = FIRST_ATTENDED + self.attended.len() as u64;
-        self.come(desk, number, true);
-        self.attended.push(Attended { number, sender });
+    /// Adds a sender, which speaks from the next fine period on.
+    pub fn add_sender(&mut self, desk: &Arc<Desk>, sender: Box<dyn VirtualSender>) {
+        let number = FIRST_ADDED + self.senders.len() as u64;
+        self.client(desk, number, true);
+        self.senders.push(AddedSender { number, sender });
     }
 
-    fn come(&mut self, desk: &Arc<Desk>, number: u64, sends: bool) -> &mut Box<dyn Talk> {
+    fn client(&mut self, desk: &Arc<Desk>, number: u64, sends: bool) -> &mut Box<dyn Talk> {
         let (lease, settings) = (&mut self.lease, &self.settings);
         self.clients.entry(number).or_insert_with(|| {
             let desk = Arc::clone(desk);
@@ -92,8 +92,13 @@ impl Script {
             let Some(ScriptLine { client, line, .. }) = self.lines.pop_front() else {
                 return;
             };
+            if line.is_empty() {
+                self.lease.release(client);
+                self.clients.remove(&client);
+                continue;
+            }
             let bytes = bytes_of(&line);
-            self.come(desk, client, bytes.is_some());
+            self.client(desk, client, bytes.is_some());
             let Some(talk) = self.clients.get_mut(&client) else {
                 return;
             };
@@ -103,7 +108,7 @@ impl Script {
             };
             self.print(tick, Some(client), &answer.line, tell);
         }
-        self.ask_attended(desk, tick, now, tell);
+        self.ask_senders(tick, now, tell);
         let raw: Vec<u64> = self
             .clients
             .iter()
@@ -119,10 +124,10 @@ impl Script {
         }
     }
 
-    fn ask_attended(&mut self, desk: &Arc<Desk>, tick: u64, now: Instant, tell: Tell<'_>) {
+    fn ask_senders(&mut self, tick: u64, now: Instant, tell: Tell<'_>) {
         let mut said = vec![];
         let mut gone = vec![];
-        for Attended { number, sender } in &mut self.attended {
+        for AddedSender { number, sender } in &mut self.senders {
             let heard = self.heard.remove(number).unwrap_or_default();
             let mut bytes = vec![];
             let stays = sender.period(tick, &heard, &mut bytes);
@@ -140,9 +145,8 @@ impl Script {
         for number in gone {
             self.lease.release(number);
             self.clients.remove(&number);
-            self.attended.retain(|one| one.number != number);
+            self.senders.retain(|one| one.number != number);
         }
-        let _ = desk;
     }
 
     fn print(&mut self, tick: u64, client: Option<u64>, line: &str, tell: Tell<'_>) {
@@ -153,7 +157,7 @@ impl Script {
         if line.is_empty() {
             return;
         }
-        if number >= FIRST_ATTENDED {
+        if number >= FIRST_ADDED {
             self.heard.entry(number).or_default().push_str(line);
         } else if self.clients.get(&number).is_some_and(|talk| talk.is_raw()) {
             tell(&json!({ "tick": tick, "client": number, "told": { "grbl": line } }).to_string());
@@ -197,8 +201,10 @@ impl Script {
 }
 
 fn print(tick: u64, client: Option<u64>, line: &str, tell: Tell<'_>) {
-    if let Ok(told) = serde_json::from_str::<Value>(line) {
-        tell(&json!({ "tick": tick, "client": client, "told": told }).to_string());
+    for line in line.lines() {
+        if let Ok(told) = serde_json::from_str::<Value>(line) {
+            tell(&json!({ "tick": tick, "client": client, "told": told }).to_string());
+        }
     }
 }
 

@@ -46,6 +46,7 @@ impl Desk {
             "block": (inner.mode != Mode::Idle).then_some(seen.block),
             "distance_to_go": shown(&to_go),
             "path": self.path().brief(),
+            "bus": self.has_bus.then(|| self.bus()),
             "inputs": self.inputs(),
             "outputs": self.outputs(&seen.switched),
             "coolant": seen.switched.coolant(),
@@ -70,6 +71,18 @@ impl Desk {
         }
         status
     }
+
+    /// How well the drives are heard.
+    fn bus(&self) -> Value {
+        let bus = &self.status.bus;
+        let phase_us = bus.phase_ns.load(Relaxed) as f64 / 1e3;
+        json!({
+            "feedback_age_periods": bus.age_periods.load(Relaxed),
+            "old_feedback_periods": bus.old_periods.load(Relaxed),
+            "phase_us": bus.has_phase.load(Relaxed).then_some(phase_us),
+        })
+    }
+
     /// The inputs that have a name, as they were read last.
     fn inputs(&self) -> Map<String, Value> {
         let inputs = self.status.inputs.load(Relaxed);

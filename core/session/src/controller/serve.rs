@@ -7,22 +7,25 @@ use std::sync::atomic::Ordering::Relaxed;
 use serde_json::{Value, json};
 use tandem_gcode::{Interpreter, Lasting, Program};
 use tandem_host::{
-    Clock, HostError, JobOutcome, Memory, PreparedJob, Registry, Resident, RunObserver, Switches,
-    axis_limits, interpreter_config, moves_metal, planner,
+    Clock, HostError, JobOutcome, Memory, PolicyParameter, PreparedJob, Registry, Resident,
+    RunObserver, Switches, axis_limits, interpreter_config, moves_metal, planner,
 };
 use tandem_machine::Machine;
 use tandem_state::Change;
 
+use super::arrivals::Arrivals;
+use super::ask::STOPPED;
+use super::clerk;
 use super::desk::{Desk, From, Loaded, Mode, Order};
 use super::keeper::Keeper;
 use super::lines::{LineSource, Lines, lock};
 use super::path::DrawnPath;
-use super::record::Recording;
+use super::record::{Raise, Recording, Records};
 use super::script::{Script, VirtualSender};
 use super::talk::Office;
-use super::watch::{Jogs, Notes, Watch};
+use super::watch::{Notes, Refusals, Watch};
 use crate::HOMING;
-use crate::jog::JogController;
+use crate::jog::{JogController, Jogging};
 use crate::operator::{Listen, OperatorHub, Server};
 
 /// What a controller is asked for.
@@ -35,6 +38,8 @@ pub struct Options {
     pub programs: Option<PathBuf>,
     /// The folder in which every job leaves its files; none where none is kept.
     pub record: Option<PathBuf>,
+    /// The file to which what clients say is written, by fine periods; none where it is not.
+    pub arrivals: Option<PathBuf>,
     /// Enable the drives at once.
     pub enable: bool,
     /// On the virtual clock: what clients ask, and when.
@@ -45,6 +50,23 @@ pub struct Options {
     pub lasting: Option<Lasting>,
 }
 
+impl Options {
+    /// What clients say by `script`, on the virtual clock: drives that are enabled at once, no doors, and no files.
+    pub fn of_script(script: Vec<ScriptLine>) -> Self {
+        Self {
+            clock: Clock::Virtual,
+            listen: Listen::default(),
+            programs: None,
+            record: None,
+            arrivals: None,
+            enable: true,
+            script,
+            uptime_periods: 0,
+            lasting: None,
+        }
+    }
+}
+
 /// A line of a client, before a fine period of the process.
 #[derive(Clone, Debug)]
 pub struct ScriptLine {
@@ -52,12 +74,13 @@ pub struct ScriptLine {
     pub tick: u64,
     /// The client's number.
     pub client: u64,
-    /// What it says.
+    /// What it says; empty where it leaves.
     pub line: String,
 }
 
 impl ScriptLine {
-    /// Reads `{"tick":120,"client":1,"say":{"id":1,"request":"status"}}`; without a client it is number 1.
+    /// Reads `{"tick":120,"client":1,"say":{"id":1,"request":"status"}}`; without a client it is number 1. With `"leaves":true` in
+    /// place of what it says the client is gone, which is an empty line.
     ///
     /// # Errors
     /// What is wrong with the line.
@@ -70,6 +93,10 @@ impl ScriptLine {
             .get("client")
             .map_or(Some(1), Value::as_u64)
             .ok_or("\"client\" is a number")?;
+        if value["leaves"] == true {
+            let line = String::new();
+            return Ok(Self { tick, client, line });
+        }
         let say = value
             .get("say")
             .ok_or("it has no \"say\", the line of the client")?;
@@ -90,7 +117,7 @@ pub struct Controller<'r> {
     clock: Clock,
     script: Script,
     simulated: bool,
-    record: Option<PathBuf>,
+    records: Option<Records>,
 }
 
 impl<'r> Controller<'r> {
@@ -116,7 +143,7 @@ impl<'r> Controller<'r> {
         }
         let lines = Lines::new(
             &machine,
-            planner(&machine, registry)?,
+            [planner(&machine, registry)?, planner(&machine, registry)?],
             Interpreter::new(config),
         );
         let mut jogged = machine.clone();
@@ -128,7 +155,7 @@ impl<'r> Controller<'r> {
         let lines = Arc::new(std::sync::Mutex::new(lines));
         let unknown = not_homed(&machine, resident.unknown_axes());
         let keepsakes = keeper.remembered().policy_parameters;
-        let desk = Desk::new(
+        let mut desk = Desk::new(
             &machine,
             hub,
             status,
@@ -139,6 +166,10 @@ impl<'r> Controller<'r> {
             unknown,
         )
         .map_err(system)?;
+        desk.has_bus = resident.has_bus();
+        let arrivals = options.arrivals.as_deref();
+        let arrivals = arrivals.map(|path| Arrivals::create(path, machine.fine_period_s));
+        desk.arrivals = arrivals.transpose().map_err(system)?;
         let desk = Arc::new(desk);
         if options.clock == Clock::Virtual {
             desk.set_replay_time(0.0);
@@ -153,6 +184,7 @@ impl<'r> Controller<'r> {
             }
         }
         desk.lock().policy_parameters = resident.policy_parameters();
+        desk.lock().declared_parameters = declared(resident.declared_parameters()?);
         desk.stands(&machine.start, unknown);
         if options.enable {
             desk.lock().order = Some(Order::Enable {
@@ -170,6 +202,11 @@ impl<'r> Controller<'r> {
             Some(Server::of(Arc::new(office), &options.listen).map_err(system)?)
         };
         let script = Script::new(options.script);
+        let records = options.record.map(|root| {
+            let desk = Arc::clone(&desk);
+            let raise: Raise = Arc::new(move |why: &str| desk.raise("record", why));
+            Records::new(root, options.clock, machine.rough_period_s, raise)
+        });
         Ok(Self {
             resident,
             desk,
@@ -177,7 +214,7 @@ impl<'r> Controller<'r> {
             clock: options.clock,
             script,
             simulated,
-            record: options.record,
+            records,
         })
     }
 
@@ -192,8 +229,8 @@ impl<'r> Controller<'r> {
     }
 
     /// On the virtual clock, somebody sends lines as grbl is sent them, until it hangs up. Before the run.
-    pub fn attend(&mut self, sender: Box<dyn VirtualSender>) {
-        self.script.attend(&self.desk, sender);
+    pub fn add_sender(&mut self, sender: Box<dyn VirtualSender>) {
+        self.script.add_sender(&self.desk, sender);
     }
 
     /// What ends the controller, for signals: the machine comes to rest on the path, and its drives let go.
@@ -221,12 +258,20 @@ impl<'r> Controller<'r> {
                 }
             }
         }
+        // Lines that came at the end, behind the last job.
+        self.desk.give_up_order(self.resident.machine().start);
         self.script
             .flush(&self.desk, self.resident.uptime_periods(), self.clock, tell);
         self.resident.stop(&mut Notes(tell))?;
         let lasting = lock(&self.desk.lines).standing().lasting();
         self.desk.keep(lasting);
         drop(self.server);
+        clerk::wait_for_all(&self.desk);
+        if let Some(records) = &self.records {
+            records.wait_for_all();
+        }
+        // Nobody is acknowledged by it: what could not be written was told meanwhile, and is tried once more.
+        let _ = self.desk.keeper.commit(vec![]);
         Ok(())
     }
 
@@ -274,7 +319,9 @@ impl<'r> Controller<'r> {
                 self.drive_or_tell(job, None, Mode::Jog, "jogging", tell)?;
             }
             Order::Jog => {
-                let source = Box::new(Jogs::new(Arc::clone(&self.desk)));
+                let refusals = Refusals(Arc::clone(&self.desk));
+                let source = Jogging::until_still(&self.desk.jogs, Box::new(refusals));
+                let source = Box::new(source);
                 let switches = Switches {
                     unhomed: true,
                     ..self.switches()
@@ -392,7 +439,7 @@ impl<'r> Controller<'r> {
         let mut drawn = DrawnPath::new(self.resident.machine().axes);
         match self.prepare(&program, &mut drawn) {
             Err(why) => {
-                self.desk.lock().order = None;
+                self.desk.give_up_order(self.resident.machine().start);
                 self.desk.answer(from, Err(why));
                 Ok(())
             }
@@ -415,14 +462,7 @@ impl<'r> Controller<'r> {
         match job {
             Ok(job) => self.drive(job, from, mode, name, tell),
             Err(why) => {
-                self.desk.lock().order = None;
-                let dropped = lock(&self.desk.lines).end_job(
-                    self.resident.machine().start,
-                    false,
-                    false,
-                    false,
-                );
-                self.desk.tell_driven(&dropped, false);
+                self.desk.give_up_order(self.resident.machine().start);
                 match from {
                     Some(from) => self.desk.answer(from, Err(why.to_string())),
                     None => self.desk.send(
@@ -444,13 +484,19 @@ impl<'r> Controller<'r> {
         tell: Tell<'_>,
     ) -> Result<(), HostError> {
         let length_mm = job.checked().length_mm;
+        if !self.desk.begin(mode) {
+            self.desk.give_up_order(self.resident.machine().start);
+            if let Some(from) = from {
+                self.desk.answer(from, Err(STOPPED.to_string()));
+            }
+            return Ok(());
+        }
         if mode != Mode::Program {
             self.desk.path().begin(name, true);
         }
         self.desk.scope().begin_job(&job.signals());
-        self.desk.begin(mode);
         self.desk.begin_history(mode, name);
-        let recording = self.recording(mode, &job.signals());
+        let recording = self.recording(mode, job.signals());
         if let Some(from) = from {
             self.desk.answer(from, Ok(json!({ "begins": name })));
         }
@@ -466,24 +512,17 @@ impl<'r> Controller<'r> {
         let outcome = self.resident.drive(job, &mut watch)?;
         let recording = watch.recording.take();
         self.finish(mode, name, &outcome);
-        for why in recording.map_or(vec![], |recording| recording.finish(&outcome)) {
-            self.desk.raise("record", &why);
+        if let Some(recording) = recording {
+            recording.finish(&outcome);
         }
         Ok(())
     }
 
-    /// The files that a job leaves, where they are kept; a disk that cannot take them keeps no job from being driven.
-    fn recording(&self, mode: Mode, signals: &[String]) -> Option<Recording> {
-        let root = self.record.as_ref()?;
+    /// The files that a job leaves, where they are kept.
+    fn recording(&self, mode: Mode, signals: Vec<String>) -> Option<Recording> {
+        let records = self.records.as_ref()?;
         let number = self.desk.lock().history.open()?;
-        let about = (number, mode.name());
-        match Recording::begin(root, about, self.resident.machine(), signals) {
-            Ok(recording) => Some(recording),
-            Err(why) => {
-                self.desk.raise("record", &why);
-                None
-            }
-        }
+        Some(records.begin((number, mode.name()), self.resident.machine(), signals))
     }
 
     fn finish(&self, mode: Mode, name: &str, outcome: &JobOutcome) {
@@ -495,7 +534,8 @@ impl<'r> Controller<'r> {
         let mut inner = self.desk.lock();
         inner.fault = None;
         drop(inner);
-        self.desk.begin(Mode::Enabling);
+        // Nothing stops the drives on their way but what stops them there.
+        let _ = self.desk.begin(Mode::Enabling);
         let mut watch = Watch::new(
             &self.desk,
             &mut self.script,
@@ -526,6 +566,17 @@ impl<'r> Controller<'r> {
     pub fn is_simulated(&self) -> bool {
         self.simulated
     }
+}
+
+/// Parameters of the policy script as clients are told them.
+fn declared(all: Vec<PolicyParameter>) -> Vec<Value> {
+    let shown = |of: PolicyParameter| {
+        json!({
+            "name": of.name, "description": of.description,
+            "lowest": of.lowest, "highest": of.highest, "default": of.default,
+        })
+    };
+    all.into_iter().map(shown).collect()
 }
 
 /// Axes without which nothing but a jog may be driven: those of which nobody knows where they are.

@@ -15,7 +15,7 @@ use super::request::Asked;
 impl Desk {
     /// Changes what lasts; it is on disk when this returns.
     pub fn set(&self, asked: &Asked, name: &str) -> Result<Value, String> {
-        let mut lines = lock(&self.lines);
+        let lines = lock(&self.lines);
         let axes = &self.machine.axes;
         self.check_axes(asked)?;
         // Axis words in mm and deg, as keys such as x_mm and a_deg.
@@ -66,8 +66,10 @@ impl Desk {
             _ => self.with_tool(lines.standing().lasting(), asked)?,
         };
         changes.push(Change::Program(Arc::new(lasting.clone())));
+        // Nothing else changes meanwhile what lasts: nothing is driven, and nothing is begun.
+        drop(lines);
         self.keeper.commit(changes)?;
-        lines.set_lasting(&lasting);
+        lock(&self.lines).set_lasting(&lasting);
         Ok(json!({ "set": name }))
     }
 

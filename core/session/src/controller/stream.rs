@@ -9,7 +9,7 @@ use tandem_host::Command;
 use tandem_rings::{MachineState, Status};
 use tandem_sdk::{AxisVector, Block};
 
-use super::desk::{Desk, From, Mode, Order};
+use super::desk::{Books, Desk, From, Inner, Mode, Order};
 use super::lines::{Lines, TakenLine, lock};
 use super::states::{ControllerState, judge};
 use crate::judge::Refusal;
@@ -40,26 +40,81 @@ impl Desk {
     /// Judges a line of a sender and takes it.
     pub fn take_line(&self, from: From, text: &str) -> Result<TakenLine, NotTaken> {
         let mut inner = self.lock();
-        let state = self.state_of(&inner);
+        let mut lines = lock(&self.lines);
+        self.may_take_line(&inner, &lines)?;
+        let taken = lines
+            .judge(from.client, from.id, text)
+            .map_err(NotTaken::Refused)?;
+        self.begin_for_line(&mut inner, &mut lines, taken);
+        Ok(taken)
+    }
+
+    /// Whether a line calls a subroutine, whose file is read when it is judged.
+    pub fn calls(&self, text: &str) -> bool {
+        lock(&self.lines).calls(text)
+    }
+
+    /// The same for a line that calls a subroutine and came when so many stops had been asked for, where it `is_wanted` still. It
+    /// reads files, and nothing is locked meanwhile.
+    pub fn take_call(
+        &self,
+        from: From,
+        text: &str,
+        stops: u64,
+        is_wanted: impl Fn() -> bool,
+    ) -> Result<TakenLine, NotTaken> {
+        let files = lock(&self.lines).files();
+        loop {
+            let inner = self.lock();
+            let mut lines = lock(&self.lines);
+            self.may_take_line(&inner, &lines)?;
+            let call = lines.begin_call().map_err(NotTaken::Refused)?;
+            drop((lines, inner));
+            let judged = call.judge(&files, text).map_err(NotTaken::Refused)?;
+            let mut inner = self.lock();
+            let mut lines = lock(&self.lines);
+            if inner.stops != stops || !is_wanted() {
+                let why = "the machine was stopped before the line was begun";
+                return Err(NotTaken::Locked(why.to_string()));
+            }
+            self.may_take_line(&inner, &lines)?;
+            let Some(taken) = lines.end_call((from.client, from.id), &call, judged) else {
+                continue;
+            };
+            let taken = taken.map_err(NotTaken::Refused)?;
+            self.begin_for_line(&mut inner, &mut lines, taken);
+            return Ok(taken);
+        }
+    }
+
+    /// Judges a call and drives nothing: what is true behind it. It reads files, and nothing is locked meanwhile.
+    pub fn check_call(&self, before: &Interpreter, text: &str) -> Result<Interpreter, Refusal> {
+        let files = lock(&self.lines).files();
+        Lines::check_call(&files, before, text)
+    }
+
+    fn may_take_line(&self, inner: &Inner, lines: &Lines) -> Result<(), NotTaken> {
+        let state = self.state_of(inner);
         match state {
             ControllerState::Ready | ControllerState::Mdi => {}
             ControllerState::Stopping | ControllerState::Held => return Err(NotTaken::NotYet),
             ControllerState::Manual if self.is_jog_ending() => return Err(NotTaken::NotYet),
             state => return Err(locked(state, "mdi")),
         }
-        if !matches!(inner.order, None | Some(Order::Mdi)) {
+        if inner.books == Books::Written || !matches!(inner.order, None | Some(Order::Mdi)) {
             return Err(NotTaken::NotYet);
         }
-        let mut lines = lock(&self.lines);
         if lines.are_jogs() && lines.is_at_work() {
             return Err(locked(ControllerState::Manual, "mdi"));
         }
         if lines.awaits_answer() || lines.count_waiting() >= PLACES {
             return Err(NotTaken::NotYet);
         }
-        let taken = lines
-            .judge(from.client, from.id, text)
-            .map_err(NotTaken::Refused)?;
+        Ok(())
+    }
+
+    /// A job for a line that was taken, where it needs one.
+    fn begin_for_line(&self, inner: &mut Inner, lines: &mut Lines, taken: TakenLine) {
         if taken.begins && inner.mode == Mode::Idle {
             if lines.take_up_at_rest() {
                 self.keep(lines.standing().lasting());
@@ -67,7 +122,6 @@ impl Desk {
                 inner.order = Some(Order::Mdi);
             }
         }
-        Ok(taken)
     }
 
     /// Judges a jog, words as of G1, and takes it: it is planned through into those that follow in time.
@@ -83,7 +137,7 @@ impl Desk {
             state => return Err(locked(state, "jog")),
         }
         let joins = matches!(inner.order, None | Some(Order::JogLines));
-        if !joins && !matches!(inner.order, Some(Order::Mdi)) {
+        if inner.books == Books::Written || !joins && !matches!(inner.order, Some(Order::Mdi)) {
             return Err(NotTaken::NotYet);
         }
         let mut lines = lock(&self.lines);
@@ -142,7 +196,7 @@ impl Desk {
         let mut lines = lock(&self.lines);
         let of_lines = lines.are_jogs() && lines.is_at_work();
         if of_lines {
-            lines.forget_waiting();
+            self.tell_driven(&lines.forget_waiting(), false);
         }
         drop(lines);
         if of_lines && inner.mode == Mode::Jog {
@@ -164,15 +218,17 @@ impl Desk {
     /// Lines that wait are forgotten, and what is driven comes to rest on its path.
     pub fn stop(&self) {
         let mut inner = self.lock();
-        lock(&self.lines).forget_waiting();
-        if matches!(inner.order, Some(Order::Mdi | Order::JogLines)) && inner.mode == Mode::Idle {
-            inner.order = None;
+        let forgotten = lock(&self.lines).forget_waiting();
+        self.tell_driven(&forgotten, false);
+        if inner.is_about_to_move() {
+            inner.aborting = true;
         }
         let drives = !matches!(inner.mode, Mode::Idle | Mode::Enabling);
         if drives && self.hub.give(Command::Abort).is_ok() {
             inner.aborting = true;
             self.jogs.forget();
         }
+        inner.stops += 1;
     }
 
     /// Whether nothing is driven, and nothing is about to be.

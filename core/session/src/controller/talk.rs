@@ -1,21 +1,28 @@
 //! One client's conversation with a controller.
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use serde_json::{Map, Value, json};
 
-use super::desk::{Desk, From};
+use super::clerk::Clerk;
+use super::desk::{Answered, Desk, From};
 use super::request::{Asked, read};
-use super::words::{Role, word_of};
+use super::words::word_of;
 use crate::grbl::{Sender, Settings};
-use crate::operator::{Answer, House, Lease, MAX_OWNERS, News, Problem, Talk, is_same};
+use crate::operator::{Answer, House, Lease, MAX_OWNERS, News, Problem, Role, Talk, Tokens};
 
 /// The protocol's number, in the greeting.
 const PROTOCOL: u32 = 2;
 /// Longest line, bytes: a program may be in it. Who has not said who it is has less.
 const MAX_LINE_BYTES: usize = 8 << 20;
 const MAX_STRANGERS_LINE_BYTES: usize = 4096;
+/// Requests that wait behind one that waits for a disk, and their bytes.
+const MAX_BEHIND: usize = 4096;
+const MAX_BEHIND_BYTES: usize = 32 << 20;
+/// Requests that have waited and are done in one round.
+const MAX_A_ROUND: usize = 8;
 /// Lowest and highest rate of a subscription, Hz.
 const RATES_HZ: std::ops::RangeInclusive<f64> = 0.01..=100.0;
 /// Who lives behind the doors of a controller.
@@ -26,20 +33,24 @@ pub struct Office {
 }
 
 impl House for Office {
-    fn newcomer(&self, number: u64, token: Option<String>) -> Box<dyn Talk> {
+    fn newcomer(&self, number: u64, tokens: Option<Arc<Tokens>>) -> Box<dyn Talk> {
         Box::new(Protocol2 {
             desk: Arc::clone(&self.desk),
             client: number,
-            token,
+            tokens,
             has_place: true,
             role: Role::SetUp,
             subscription: None,
+            clerk: Some(Clerk::new(Arc::clone(&self.desk))),
+            behind: VecDeque::new(),
+            behind_bytes: 0,
+            brings: false,
         })
     }
 
     fn sender(&self, number: u64, place: &str) -> Option<Box<dyn Talk>> {
         let (desk, settings) = (Arc::clone(&self.desk), Arc::clone(&self.settings));
-        let sender = Sender::new(desk, settings, number, place);
+        let sender = Sender::new(desk, settings, number, place).with_clerk();
         Some(Box::new(sender.greeted_after(Instant::now())))
     }
 
@@ -62,10 +73,26 @@ impl House for Office {
 pub struct Protocol2 {
     desk: Arc<Desk>,
     client: u64,
-    token: Option<String>,
+    /// Until it has named one of them.
+    tokens: Option<Arc<Tokens>>,
     has_place: bool,
     role: Role,
     subscription: Option<Subscription>,
+    /// Waits for disks; none where everything is done in lockstep.
+    clerk: Option<Clerk>,
+    /// What came behind a request that waits for a disk.
+    behind: VecDeque<Waiting>,
+    behind_bytes: usize,
+    /// It has begun to bring a program.
+    brings: bool,
+}
+
+/// A request that was granted and waits.
+struct Waiting {
+    asked: Asked,
+    bytes: usize,
+    /// So many stops had been asked for when it came.
+    stops: u64,
 }
 
 /// Status lines that a client has asked for.
@@ -85,10 +112,14 @@ impl Protocol2 {
         Self {
             desk,
             client,
-            token: None,
+            tokens: None,
             has_place: true,
             role: Role::SetUp,
             subscription: None,
+            clerk: None,
+            behind: VecDeque::new(),
+            behind_bytes: 0,
+            brings: false,
         }
     }
 
@@ -113,48 +144,47 @@ impl Protocol2 {
     }
 
     fn introduce(&mut self, asked: Option<&Asked>) -> Answer {
-        let expected = self.token.as_deref().unwrap_or_default();
-        let given = asked
+        let Some((asked, given)) = asked
             .filter(|asked| asked.request == "token")
-            .and_then(|asked| asked.text("token").ok());
-        match given {
-            Some(given) if is_same(given, expected) && self.has_place => {
-                self.token = None;
+            .and_then(|asked| Some((asked, asked.text("token").ok()?)))
+        else {
+            let why = "the first line over TCP is {\"id\":0,\"request\":\"token\",\"token\":\"…\"}"
+                .to_string();
+            return self.close(&Problem::refused("the whole line", why));
+        };
+        match self.tokens.as_ref().and_then(|all| all.role_of(given)) {
+            Some(role) if self.has_place => {
+                (self.tokens, self.role) = (None, role);
+                if role != Role::SetUp {
+                    // The token is for nobody else to read; what it allows is said by this.
+                    let says =
+                        json!({ "id": asked.id, "request": "role", "as": role.name() }).to_string();
+                    self.desk.note(|all| all.line(self.client, &says));
+                }
                 Answer {
                     line: self.greeting_line(),
                     last: false,
                 }
             }
-            Some(given) if is_same(given, expected) => self.close(&Problem::crowded(MAX_OWNERS)),
-            Some(_) => self.close(&Problem::refused(
+            Some(_) => self.close(&Problem::crowded(MAX_OWNERS)),
+            None => self.close(&Problem::refused(
                 "key \"token\"",
                 "it is another token".to_string(),
             )),
-            None => {
-                let why =
-                    "the first line over TCP is {\"id\":0,\"request\":\"token\",\"token\":\"…\"}"
-                        .to_string();
-                self.close(&Problem::refused("the whole line", why))
-            }
         }
     }
 
-    fn grant(
-        &mut self,
-        asked: &Asked,
-        lease: &mut Lease,
-        now: Instant,
-    ) -> Option<Result<Value, String>> {
-        let is_stop = asked.request == "jog" && asked.with.contains_key("stop");
-        let name = if is_stop { "jog-stop" } else { &asked.request };
+    /// Whether this client may ask for it now.
+    fn permit(&self, asked: &Asked, lease: &Lease) -> Result<(), String> {
+        let name = asked.name();
         let needs_lease = word_of(name).is_some_and(|word| word.lease);
         if let Some(word) = word_of(name).filter(|word| word.role > self.role) {
-            return Some(Err(format!(
+            return Err(format!(
                 "{} may only be asked by who may {}; this client may {}",
                 asked.request,
                 word.role.name(),
                 self.role.name()
-            )));
+            ));
         }
         if needs_lease && !lease.is_held_by(self.client) {
             let holder = lease
@@ -162,22 +192,89 @@ impl Protocol2 {
                 .map_or("nobody holds it".to_string(), |client| {
                     format!("{} holds it", lease.name_of(client))
                 });
-            return Some(Err(format!(
+            return Err(format!(
                 "it needs the control lease, and {holder}; stops, hold and what only looks need none"
-            )));
+            ));
+        }
+        Ok(())
+    }
+
+    /// Does what is asked for, or sees to it that it is done: behind what waits for a disk, unless it stops the machine.
+    fn grant(&mut self, asked: Asked, bytes: usize, lease: &mut Lease, now: Instant) -> Answered {
+        if let Err(why) = self.permit(&asked, lease) {
+            return Some(Err(why));
         }
         match asked.request.as_str() {
-            "lease" => Some(self.lease(asked, lease, now)),
-            "subscribe" => Some(self.subscribe(asked, now)),
-            "token" => Some(Err("no token is asked for here".to_string())),
-            _ => self.desk.ask(
-                From {
-                    client: self.client,
-                    id: asked.id,
-                },
-                asked,
-            ),
+            "lease" => return Some(self.lease(&asked, lease, now)),
+            "subscribe" => return Some(self.subscribe(&asked, now)),
+            "role" => return Some(self.step_down(&asked, lease)),
+            "token" => return Some(Err("no token is asked for here".to_string())),
+            _ => {}
         }
+        let stops = self.desk.stops();
+        if !self.is_busy() || asked.is_stop() {
+            return self.begin(asked, stops);
+        }
+        if self.behind.len() >= MAX_BEHIND || self.behind_bytes + bytes > MAX_BEHIND_BYTES {
+            return Some(Err(
+                "too many requests wait for their answers: wait for some".to_string(),
+            ));
+        }
+        self.behind_bytes += bytes;
+        self.behind.push_back(Waiting {
+            asked,
+            bytes,
+            stops,
+        });
+        None
+    }
+
+    /// Does it here, or has it done where a disk is waited for.
+    fn begin(&mut self, asked: Asked, stops: u64) -> Answered {
+        let from = From {
+            client: self.client,
+            id: asked.id,
+        };
+        self.brings |= asked.request == "upload";
+        let clerk = self
+            .clerk
+            .as_ref()
+            .filter(|_| self.desk.waits_for_disk(&asked));
+        let Some(clerk) = clerk else {
+            return self.desk.ask_since(from, &asked, stops);
+        };
+        let begun = clerk.give(move |desk| {
+            let defect = Defect(desk, from);
+            let answer = desk.ask_since(from, &asked, stops);
+            std::mem::forget(defect);
+            if let Some(answer) = answer {
+                desk.answer(from, answer);
+            }
+        });
+        (!begun).then(|| Err("the computer has no thread that waits for the disk".to_string()))
+    }
+
+    fn answer_line(&self, id: u64, answer: Answered) -> String {
+        match answer {
+            None => String::new(),
+            Some(Ok(ok)) => format!("{}\n", json!({ "id": id, "ok": ok })),
+            Some(Err(why)) => self.refused(Some(id), &why),
+        }
+    }
+
+    /// The client may do less from here on: for whoever speaks for somebody who named another token.
+    fn step_down(&mut self, asked: &Asked, lease: &mut Lease) -> Result<Value, String> {
+        check(asked)?;
+        let role = Role::of_name(asked.text("as")?).ok_or("there is no such role")?;
+        if role > self.role {
+            let now = self.role.name();
+            return Err(format!("a role is never widened: this client may {now}"));
+        }
+        self.role = role;
+        if role < Role::Operate {
+            lease.release(self.client);
+        }
+        Ok(json!({ "role": role.name() }))
     }
 
     fn lease(&self, asked: &Asked, lease: &mut Lease, now: Instant) -> Result<Value, String> {
@@ -250,7 +347,7 @@ impl Talk for Protocol2 {
     }
 
     fn is_known(&self) -> bool {
-        self.token.is_none()
+        self.tokens.is_none()
     }
 
     fn set_has_place(&mut self, has_place: bool) {
@@ -275,18 +372,46 @@ impl Talk for Protocol2 {
         if !self.is_known() {
             return self.introduce(asked.as_ref().ok());
         }
+        self.desk.note(|all| all.line(self.client, text));
         let line = match asked {
             Err((id, why)) => format!(
                 "{}\n",
                 json!({ "id": id, "error": { "what": "malformed line", "why": why } })
             ),
-            Ok(asked) => match self.grant(&asked, lease, now) {
-                None => String::new(),
-                Some(Ok(ok)) => format!("{}\n", json!({ "id": asked.id, "ok": ok })),
-                Some(Err(why)) => self.refused(Some(asked.id), &why),
-            },
+            Ok(asked) => {
+                let (id, steps_down) = (asked.id, asked.request == "role");
+                let answer = self.grant(asked, text.len(), lease, now);
+                let is_done = matches!(answer, Some(Ok(_)));
+                let line = self.answer_line(id, answer);
+                if steps_down && is_done {
+                    line + &self.greeting_line()
+                } else {
+                    line
+                }
+            }
         };
         Answer { line, last: false }
+    }
+
+    fn is_busy(&self) -> bool {
+        !self.behind.is_empty() || self.clerk.as_ref().is_some_and(Clerk::is_busy)
+    }
+
+    fn turn(&mut self, _lease: &mut Lease, _now: Instant) -> String {
+        let mut said = String::new();
+        for _ in 0..MAX_A_ROUND {
+            if self.clerk.as_ref().is_some_and(Clerk::is_busy) {
+                break;
+            }
+            let Some(next) = self.behind.pop_front() else {
+                break;
+            };
+            self.behind_bytes -= next.bytes;
+            let id = next.asked.id;
+            let answer = self.begin(next.asked, next.stops);
+            said.push_str(&self.answer_line(id, answer));
+        }
+        said
     }
 
     fn close(&self, problem: &Problem) -> Answer {
@@ -312,7 +437,13 @@ impl Talk for Protocol2 {
     }
 
     fn due(&self) -> Option<Instant> {
-        self.subscription.as_ref().map(|of| of.due)
+        // What has waited is gone on with at once; the end of what waits for a disk rings.
+        let waits = self.clerk.as_ref().is_some_and(Clerk::is_busy) || self.behind.is_empty();
+        let now = (!waits).then(Instant::now);
+        [now, self.subscription.as_ref().map(|of| of.due)]
+            .into_iter()
+            .flatten()
+            .min()
     }
 
     fn telemetry(&mut self, lost: u64) -> String {
@@ -359,6 +490,27 @@ pub fn frame_line(lost: u64, frame: &str) -> String {
 
 impl Drop for Protocol2 {
     fn drop(&mut self) {
-        self.desk.forget(self.client);
+        self.desk.scope().forget(self.client);
+        self.desk.note(|all| all.leaves(self.client));
+        if !self.brings {
+            return;
+        }
+        let client = self.client;
+        let forget = move |desk: &Desk| desk.forget_upload(client);
+        match &self.clerk {
+            // Without a thread it stays where it is until the next one of its name.
+            Some(clerk) => _ = clerk.give(forget),
+            None => forget(&self.desk),
+        }
+    }
+}
+
+/// Answers a request whose doing has failed in a way that nobody has foreseen.
+struct Defect<'a>(&'a Desk, From);
+
+impl Drop for Defect<'_> {
+    fn drop(&mut self) {
+        let why = "a defect of the controller: the request may have been done in part";
+        self.0.answer(self.1, Err(why.to_string()));
     }
 }

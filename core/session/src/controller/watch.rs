@@ -5,10 +5,8 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 
 use serde_json::json;
-use tandem_gcode::Item;
 use tandem_host::{Clock, RunObserver, StopAnswer};
-use tandem_rings::{Rest, RestCause, Sample};
-use tandem_rough::Source;
+use tandem_rings::{MachineState, Rest, RestCause, Sample};
 use tandem_sdk::{AxisVector, Block, BlockReport, Curve, Event};
 use tandem_state::Driven;
 
@@ -17,7 +15,7 @@ use super::lines::lock;
 use super::record::Recording;
 use super::script::Script;
 use super::serve::Tell;
-use crate::standing::Standing;
+use crate::jog::{JogController, JogInput, JogRest};
 
 /// Takes notes only.
 pub struct Notes<'a>(pub Tell<'a>);
@@ -38,6 +36,10 @@ pub struct Watch<'a> {
     length_mm: f64,
     driven_mm: f64,
     block: Option<u64>,
+    /// The block that the path has begun, as far as lines were told of it.
+    reached: Option<u64>,
+    /// The last sample was of a machine that runs.
+    ran: bool,
     /// Ends of the blocks that are planned and not driven.
     ends_of: VecDeque<(u64, AxisVector)>,
     /// Where the last sample was, for those who draw the path.
@@ -71,6 +73,8 @@ impl<'a> Watch<'a> {
             length_mm,
             driven_mm: 0.0,
             block: None,
+            reached: None,
+            ran: false,
             ends_of: VecDeque::new(),
             place: None,
             line: None,
@@ -166,14 +170,27 @@ impl RunObserver for Watch<'_> {
         }
         seen.switched = sample.switched;
         drop(seen);
-        if is_next && matches!(self.mode, Mode::Program | Mode::Mdi) {
+        // A machine that stands at the first block has not begun it; what stops it there (M0) holds it from the second period on.
+        let runs = sample.state == MachineState::Running;
+        let has_begun = sample.block > 0 || runs && (self.ran || sample.feed_mm_per_s > 0.0);
+        self.ran = runs;
+        let reaches = has_begun && self.reached != Some(sample.block);
+        if reaches && matches!(self.mode, Mode::Program | Mode::Mdi) {
+            self.reached = Some(sample.block);
             let driven = lock(&self.desk.lines).reach(sample.block);
             self.desk.tell_driven(&driven, true);
         }
         self.block = Some(sample.block);
     }
 
+    fn broken_record(&mut self) -> Option<String> {
+        self.recording.as_mut()?.broken()
+    }
+
     fn period(&mut self) {
+        if let Some(recording) = &mut self.recording {
+            recording.period();
+        }
         if self.desk.is_over() && !self.ends && self.mode != Mode::Idle {
             self.ends = true;
             self.desk.hub.controls().abort.store(true, Relaxed);
@@ -206,50 +223,22 @@ impl RunObserver for Watch<'_> {
     }
 }
 
-/// The jogs that wait, as the rough loop pulls them, until none does.
-pub struct Jogs {
-    desk: Arc<Desk>,
-    standing: Standing,
-}
+/// Tells everybody of jogs that could not begin.
+pub struct Refusals(pub Arc<Desk>);
 
-impl Jogs {
-    /// Those that wait at the desk.
-    pub fn new(desk: Arc<Desk>) -> Self {
-        Self {
-            desk,
-            standing: Standing::default(),
-        }
-    }
-}
+impl JogInput for Refusals {
+    fn period(&mut self, _jogs: &JogController) {}
 
-impl Source for Jogs {
-    fn may_go_on(&mut self, driven: bool) -> bool {
-        self.standing.look(driven);
-        if self.standing.is_still() {
-            let _ = self.desk.jogs.arrived();
-        }
-        self.standing.is_still()
+    fn is_waiting(&self) -> bool {
+        false
     }
 
-    fn next_items(&mut self, items: &mut Vec<Item>) -> Result<bool, String> {
-        let (_, refused) = self.desk.jogs.next(items);
-        for why in refused {
-            self.desk.send(
-                None,
-                &json!({ "event": "refused", "job": "jogging", "why": why }),
-            );
-        }
-        if !items.is_empty() {
-            self.standing.moves();
-        }
-        Ok(!items.is_empty() || !self.desk.jogs.is_still())
-    }
+    fn rested(&mut self, _jogs: &JogController, _rest: &JogRest) {}
 
-    fn provide_input(&mut self, _value: f64) {}
-
-    fn provide_rest(&mut self, rest: &Rest) -> bool {
-        self.standing.moves();
-        let _ = self.desk.jogs.rests(rest);
-        true
+    fn refused(&mut self, why: &str) {
+        self.0.send(
+            None,
+            &json!({ "event": "refused", "job": "jogging", "why": why }),
+        );
     }
 }

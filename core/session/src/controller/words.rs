@@ -3,6 +3,8 @@
 
 use serde_json::{Map, Value, json};
 
+pub use crate::operator::Role;
+
 /// What may be in a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
@@ -20,28 +22,6 @@ pub enum Kind {
     OneOf(&'static [&'static str]),
     /// A number for each axis that is meant, under keys such as `x_mm` and `a_deg`; the name in the table stands for all.
     Axes,
-}
-
-/// What a client may do. Each may do what those before it may.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Role {
-    /// Look, and stop the machine.
-    Watch,
-    /// Drive programs, lines by hand and jogs.
-    Operate,
-    /// Change what lasts.
-    SetUp,
-}
-
-impl Role {
-    /// As people and programs read it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Watch => "watch",
-            Self::Operate => "operate",
-            Self::SetUp => "set-up",
-        }
-    }
 }
 
 /// A key of a request.
@@ -116,7 +96,7 @@ use Kind::{Axes, Number, OneOf, Switch, Text, Texts, Whole};
 
 /// All requests. A jog that is let go has a row of its own, `jog-stop`.
 #[rustfmt::skip]
-pub const WORDS: [Word; 39] = [
+pub const WORDS: [Word; 40] = [
     //                        E D N R J M P H S F
     word("status",           "++++++++++", FREE, &[], "everything that is shown of the machine"),
     word("subscribe",        "++++++++++", FREE, &[need("rate_hz", Number), may("fields", Texts), may("changes", Switch)],
@@ -124,17 +104,19 @@ pub const WORDS: [Word; 39] = [
     word("history",          "++++++++++", FREE, &[may("count", Whole)], "the last jobs and alarms, the latest first"),
     word("alarms",           "++++++++++", FREE, &[], "alarms that nobody has acknowledged"),
     word("list",             "++++++++++", FREE, &[], "the programs folder: name, bytes, when it was written (ms since 1970)"),
-    word("machine",          "++++++++++", FREE, &[], "axes with their limits, the keep-alive, and what is refused in which state"),
+    word("machine",          "++++++++++", FREE, &[], "axes with their limits, plugins, the keep-alive, and what is refused in which state and to whom"),
     word("tables",           "++++++++++", FREE, &[], "work offsets and tools"),
-    word("path",             "++++++++++", FREE, &[may("from", Whole), may("driven_from", Whole)],
+    word("path",             "++++++++++", FREE, &[may("from", Whole), may("driven_from", Whole), may("packed", Switch)],
         "the programmed path in pieces, and where the machine was; [below](#path)"),
-    word("policy-parameters", "++++++++++", FREE, &[], "parameters of the policy script"),
+    word("policy-parameters", "++++++++++", FREE, &[], "parameters of the policy script: those that are stated with their values, and all with their bounds and defaults"),
     word("scope",            "++++++++++", FREE, &[need("signals", Texts), may("every", Whole)],
         "`scope` events with these signals of every fine period, or of each `every`th; none end it; [below](#scope)"),
     word("capture",          "++++++++++", FREE, &[need("signals", Texts), may("before_s", Number), may("after_s", Number),
         may("when", Text), may("above", Number), may("below", Number)],
         "every sample around the instant in which the signal `when` goes `above` or `below`; without it, from now on"),
     word("captured",         "++++++++++", FREE, &[may("from", Whole)], "the rows of the capture that is done"),
+    word("role",             "++++++++++", FREE, &[need("as", OneOf(&["watch", "operate"]))],
+        "from here on this client may do no more than that; behind the answer the greeting comes once more"),
     word("lease",            "++++++++++", (Role::Operate, false), &[need("how", OneOf(&["take", "take-over", "release"]))],
         "the control lease"),
     word("hold",             "xxxx+++++x", FREE, &[], "a feed hold"),

@@ -117,7 +117,6 @@ impl Scanner {
             0xf0..=0xf4 => 3,
             _ => 0,
         };
-        let behind_return = std::mem::take(&mut self.behind_return);
         if let Some(real_time) = RealTime::of(byte) {
             if real_time == RealTime::Reset {
                 self.forget();
@@ -125,6 +124,7 @@ impl Scanner {
             self.behind_lead = false;
             return Some(Heard::RealTime(real_time));
         }
+        let behind_return = std::mem::take(&mut self.behind_return);
         self.bytes += usize::from(std::mem::replace(&mut self.behind_lead, byte == 0xc2));
         match byte {
             b'\n' if behind_return => None,

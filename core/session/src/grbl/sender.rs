@@ -1,7 +1,7 @@
 //! One sender: its lines in order, each with its answer.
 
 use std::collections::VecDeque;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use serde_json::{Map, Value, json};
@@ -13,7 +13,10 @@ use super::line::{Asks, check_jog, read};
 use super::report::{self, Free, Reports, Said};
 use super::scan::{Heard, Scanner, SentLine};
 use super::settings::Settings;
-use crate::controller::{Asked, ControllerState, Desk, From, Mode, NotTaken, PLACES, TakenLine};
+use crate::controller::{
+    Asked, Clerk, ControllerState, Desk, From, Mode, NotTaken, PLACES, TakenLine,
+};
+use crate::judge::Refusal;
 use crate::operator::{Answer, Lease, News, Problem, Talk};
 
 /// Bytes that are kept of a sender that does not wait for answers; more of them wait with the system.
@@ -24,6 +27,21 @@ const KEPT_FOR: Duration = Duration::from_secs(2);
 const LOOK_AGAIN: Duration = Duration::from_millis(4);
 /// How long after somebody has opened a terminal it is greeted: programs throw away what comes while they set it up.
 const GREET_AFTER: Duration = Duration::from_millis(300);
+
+/// A line that calls a subroutine: its file is read by a thread that may wait for it.
+pub(super) enum Called {
+    /// It is to be driven.
+    Driven(From, SentLine, Later<Result<TakenLine, NotTaken>>),
+    /// It is checked.
+    Checked(Later<Result<Interpreter, Refusal>>),
+}
+
+/// What is there once a thread is done.
+type Later<T> = Arc<Mutex<Option<T>>>;
+
+fn take<T>(later: &Later<T>) -> Option<T> {
+    later.lock().unwrap_or_else(PoisonError::into_inner).take()
+}
 
 /// What a line waits for that is answered later.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,10 +62,14 @@ pub struct Sender {
     settings: Arc<Settings>,
     scanner: Scanner,
     lines: VecDeque<SentLine>,
-    /// Bytes of lines without an answer.
+    /// Bytes of lines without an answer, and of the one among them that is answered when it is done.
     bytes: usize,
+    pending_bytes: usize,
     next_id: u64,
     pub(super) pending: Option<Pending>,
+    /// Waits for disks; none where everything is done in lockstep.
+    clerk: Option<Clerk>,
+    pub(super) called: Option<Called>,
     pub(super) said: Said,
     /// The lines of check mode, as far as they have come.
     pub(super) check: Option<Interpreter>,
@@ -73,8 +95,11 @@ impl Sender {
             scanner: Scanner::default(),
             lines: VecDeque::new(),
             bytes: 0,
+            pending_bytes: 0,
             next_id: 1,
             pending: None,
+            clerk: None,
+            called: None,
             said: Said::default(),
             check: None,
             resetting: false,
@@ -85,6 +110,12 @@ impl Sender {
             idle_since: None,
             out: String::new(),
         }
+    }
+
+    /// One for which threads of its own wait for disks.
+    pub fn with_clerk(mut self) -> Self {
+        self.clerk = Some(Clerk::new(Arc::clone(&self.desk)));
+        self
     }
 
     /// One that is greeted at once, as senders over a network are.
@@ -156,7 +187,9 @@ impl Sender {
     /// Lines that have come are never looked at.
     pub(super) fn forget_lines(&mut self) {
         self.lines.clear();
-        (self.bytes, self.pending) = (0, None);
+        (self.bytes, self.pending_bytes, self.pending) = (0, 0, None);
+        // What a thread still judges is then taken by nobody.
+        self.called = None;
     }
 
     /// Jogs that have come are passed over; each has an answer.
@@ -181,12 +214,15 @@ impl Sender {
 
     /// Answers lines as far as that can be done now.
     fn answer_lines(&mut self, lease: &mut Lease, now: Instant) {
-        while self.pending.is_none() && !self.resetting && !self.said.holds {
+        self.settle_call();
+        while self.pending.is_none() && self.called.is_none() && !self.resetting && !self.said.holds
+        {
             let Some(line) = self.lines.pop_front() else {
                 return;
             };
             if self.answer(&line, lease, now) {
-                self.bytes -= line.bytes;
+                self.pending_bytes = line.bytes;
+                self.free_answered();
             } else {
                 self.lines.push_front(line);
                 return;
@@ -206,7 +242,7 @@ impl Sender {
         match read(&line.text) {
             Asks::Nothing | Asks::SetStartLine("") => self.say("ok\r\n"),
             Asks::Program(text) if self.check.is_some() => self.check_line(text),
-            Asks::Program(text) => return self.drive(text, lease, now),
+            Asks::Program(text) => return self.drive(text, line, lease, now),
             Asks::Jog(words) => return self.jog(words, lease, now),
             Asks::Help => {
                 self.say("[HLP:$$ $# $G $I $N $x=val $Nx=line $J=line $SLP $C $X $H ~ ! ? ctrl-x]\r\nok\r\n");
@@ -270,14 +306,34 @@ impl Sender {
         }
     }
 
-    fn drive(&mut self, text: &str, lease: &mut Lease, now: Instant) -> bool {
+    fn drive(&mut self, text: &str, line: &SentLine, lease: &mut Lease, now: Instant) -> bool {
         if !self.may(lease, now) {
             self.say(&format!("error:{}\r\n", ErrorNumber::LOCKED.0));
             return true;
         }
         let from = self.id();
-        let taken = self.desk.take_line(from, text);
         self.idle_since = None;
+        if let Some(clerk) = self.clerk.as_ref().filter(|_| self.desk.calls(text)) {
+            let (later, text, stops) = (Later::default(), text.to_string(), self.desk.stops());
+            let found = Arc::clone(&later);
+            let begun = clerk.give(move |desk| {
+                // A reset of the sender leaves it to this thread alone.
+                let is_wanted = || Arc::strong_count(&found) > 1;
+                let taken = desk.take_call(from, &text, stops, is_wanted);
+                *found.lock().unwrap_or_else(PoisonError::into_inner) = Some(taken);
+            });
+            if begun {
+                self.called = Some(Called::Driven(from, line.clone(), later));
+            }
+            // Without a thread it is said again.
+            return begun;
+        }
+        let taken = self.desk.take_line(from, text);
+        self.settle_taken(from, taken)
+    }
+
+    /// `false` where the line is to be said again.
+    fn settle_taken(&mut self, from: From, taken: Result<TakenLine, NotTaken>) -> bool {
         match taken {
             Ok(TakenLine { rests: false, .. }) => self.say("ok\r\n"),
             Ok(TakenLine {
@@ -292,6 +348,39 @@ impl Sender {
             Err(why) => return self.not_taken(why),
         }
         true
+    }
+
+    /// What a thread has found.
+    fn settle_call(&mut self) {
+        // Looked at first: what is found lies there before the thread has ended.
+        let reads = self.clerk.as_ref().is_some_and(Clerk::is_busy);
+        match self.called.take() {
+            Some(Called::Driven(from, line, later)) => match take(&later) {
+                Some(taken) => {
+                    if !self.settle_taken(from, taken) {
+                        // It counts among those that wait.
+                        self.pending_bytes = 0;
+                        self.lines.push_front(line);
+                    }
+                }
+                None if reads => self.called = Some(Called::Driven(from, line, later)),
+                None => self.refuse(ErrorNumber::STATEMENT, "a defect of the controller"),
+            },
+            Some(Called::Checked(later)) => match take(&later) {
+                Some(checked) => self.settle_check(checked),
+                None if reads => self.called = Some(Called::Checked(later)),
+                None => self.refuse(ErrorNumber::STATEMENT, "a defect of the controller"),
+            },
+            None => {}
+        }
+        self.free_answered();
+    }
+
+    /// The bytes of a line are free once it has its answer.
+    fn free_answered(&mut self) {
+        if self.pending.is_none() && self.called.is_none() {
+            self.bytes -= std::mem::take(&mut self.pending_bytes);
+        }
     }
 
     fn jog(&mut self, words: &str, lease: &mut Lease, now: Instant) -> bool {
@@ -347,18 +436,34 @@ impl Sender {
     }
 
     fn check_line(&mut self, text: &str) {
-        let Some(check) = self.check.take() else {
+        let Some(check) = self.check.clone() else {
             return;
         };
-        match self.desk.with_lines(|lines| lines.check(&check, text)) {
+        let Some(clerk) = self.clerk.as_ref().filter(|_| self.desk.calls(text)) else {
+            let checked = self.desk.with_lines(|lines| lines.check(&check, text));
+            return self.settle_check(checked);
+        };
+        let (later, text) = (Later::default(), text.to_string());
+        let found = Arc::clone(&later);
+        let begun = clerk.give(move |desk| {
+            let checked = desk.check_call(&check, &text);
+            *found.lock().unwrap_or_else(PoisonError::into_inner) = Some(checked);
+        });
+        if begun {
+            self.called = Some(Called::Checked(later));
+        } else {
+            let why = "the computer has no thread that reads the file";
+            self.refuse(ErrorNumber::STATEMENT, why);
+        }
+    }
+
+    fn settle_check(&mut self, checked: Result<Interpreter, Refusal>) {
+        match checked {
             Ok(behind) => {
                 self.check = Some(behind);
                 self.say("ok\r\n");
             }
-            Err(why) => {
-                self.check = Some(check);
-                self.refuse(ErrorNumber::of(&why), &why.cause);
-            }
+            Err(why) => self.refuse(ErrorNumber::of(&why), &why.cause),
         }
     }
 
@@ -489,6 +594,7 @@ impl Sender {
         let Some(pending) = self.pending.take() else {
             return;
         };
+        self.bytes -= std::mem::take(&mut self.pending_bytes);
         match (pending, done) {
             (Pending::Driven { probes, ends, .. }, Ok(())) => {
                 if probes {
@@ -561,7 +667,8 @@ impl Sender {
 
     /// The machine is let go of where it has had nothing to do for a while.
     fn let_go(&mut self, lease: &mut Lease, now: Instant) {
-        let busy = !self.lines.is_empty() || self.pending.is_some() || !self.desk.is_still();
+        let waits = self.pending.is_some() || self.called.is_some();
+        let busy = !self.lines.is_empty() || waits || !self.desk.is_still();
         if busy || !lease.is_held_by(self.client) {
             self.idle_since = None;
         } else if now.duration_since(*self.idle_since.get_or_insert(now)) >= KEPT_FOR {
@@ -599,6 +706,7 @@ impl Talk for Sender {
     }
 
     fn bytes(&mut self, bytes: &[u8], lease: &mut Lease, now: Instant) -> Answer {
+        self.desk.note(|all| all.bytes(self.client, bytes));
         for byte in bytes {
             self.hear(*byte, lease, now);
         }
@@ -657,7 +765,7 @@ impl Talk for Sender {
     }
 
     fn due(&self) -> Option<Instant> {
-        let waits = !self.lines.is_empty() || self.resetting;
+        let waits = !self.lines.is_empty() || self.resetting || self.called.is_some();
         let soon = waits.then(|| Instant::now() + LOOK_AGAIN);
         [soon, self.greet_at].into_iter().flatten().min()
     }
@@ -675,5 +783,11 @@ impl Talk for Sender {
             News::AskedBy(client) => format!("[MSG:client {client} asks for the machine]\r\n"),
             News::LostTo(client) => format!("[MSG:client {client} has taken the machine over]\r\n"),
         }
+    }
+}
+
+impl Drop for Sender {
+    fn drop(&mut self) {
+        self.desk.note(|all| all.leaves(self.client));
     }
 }

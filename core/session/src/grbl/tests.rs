@@ -40,6 +40,15 @@ fn bytes_act_at_once_wherever_they_stand_in_a_line() {
         heard(b"?\n"),
         [Heard::RealTime(RealTime::Status), line("", 1)]
     );
+    assert_eq!(
+        heard(b"G0\r?\nG1\n"),
+        [
+            line("G0", 3),
+            Heard::RealTime(RealTime::Status),
+            line("G1", 3)
+        ],
+        "both ends of a line are one, whatever comes between"
+    );
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! One axis on its way home: which step follows which answer.
 
-use tandem_machine::{AxisHoming, DriveHoming, Machine, SwitchHoming};
+use tandem_machine::{AxisHoming, DriveHoming, Foot, Machine, SwitchHoming};
 use tandem_rings::{Rest, RestCause};
 
 /// Part of the travel that a search may go beyond it.
@@ -21,6 +21,8 @@ pub enum Step {
     BackOff,
     /// Goes slowly onto the switch: the position counts.
     Latch,
+    /// Goes on to the index pulse behind it, whose position counts instead.
+    Index,
     /// Is called otherwise.
     Correct {
         /// What is added to its coordinate, mm.
@@ -31,7 +33,7 @@ pub enum Step {
 }
 
 /// An axis to home.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Axis {
     /// Its index.
     pub index: usize,
@@ -41,7 +43,10 @@ pub struct Axis {
     pub drive: Option<DriveHoming>,
     /// Where it goes in the end, mm.
     pub home_mm: f64,
-    letter: char,
+    /// The gantry of which it is a joint.
+    pub foot: Option<Foot>,
+    /// As its table in the machine file is called.
+    name: String,
     travel_mm: f64,
     acceleration_mm_per_s2: f64,
     /// mm a unit of messages: 1, or a degree in rad.
@@ -59,7 +64,8 @@ impl Axis {
             plan: homing.switch().copied().unwrap_or_default(),
             drive: homing.drive().copied(),
             home_mm: machine.home[index],
-            letter: machine.axes.letter(index).to_ascii_lowercase(),
+            foot: homing.foot,
+            name: homing.table(&machine.axes, &machine.joints),
             travel_mm: limits.max_mm - limits.min_mm,
             acceleration_mm_per_s2: limits.acceleration_mm_per_s2,
             unit: if rotary {
@@ -107,12 +113,7 @@ impl Axis {
                 Step::Leave
             }),
             Step::HandOver => Ok(step),
-            _ if value < 0.0 => {
-                let back = self.shown(self.plan.back_off_mm);
-                Err(self.failure(&format!(
-                    "is still on {back} behind its edge: it sticks, or back_off is too short"
-                )))
-            }
+            _ if value < 0.0 => Err(self.sticks()),
             _ => Ok(Step::Latch),
         }
     }
@@ -125,31 +126,73 @@ impl Axis {
         let edge_mm = rest.latch.map(|latch| latch[self.index]);
         match (step, rest.cause, edge_mm) {
             (Step::Search | Step::Leave, RestCause::Edge, _) => Ok(Step::BackOff),
+            (Step::Latch, RestCause::Edge, Some(_)) if self.plan.index.is_some() => Ok(Step::Index),
             (Step::Latch, RestCause::Edge, Some(edge_mm)) => Ok(Step::Correct {
                 by_mm: self.plan.switch_mm - edge_mm,
             }),
+            (Step::Index, RestCause::Edge, Some(pulse_mm)) => Ok(Step::Correct {
+                by_mm: self.plan.index.map_or(0.0, |index| index.at_mm) - pulse_mm,
+            }),
+            (Step::Index, ..) => Err(self.no_pulse()),
             (Step::Correct { .. } | Step::HandOver, RestCause::Corrected, _) => Ok(Step::GoHome),
-            (_, RestCause::Abort, _) => Ok(self.first()),
-            (Step::Leave, ..) => {
-                let way = self.shown(self.search_mm());
-                Err(self.failure(&format!(
-                    "is on and was not released within {way}: it sticks, or invert is wrong"
-                )))
-            }
-            (Step::Search, ..) => {
-                let way = self.shown(self.search_mm());
-                Err(self.failure(&format!(
-                    "did not trip within {way}: it does not work, or the search goes away from it"
-                )))
-            }
-            _ => Err(self.failure("did not trip again: it does not work")),
+            (Step::Leave, ..) => Err(self.stays_on()),
+            (Step::Search, ..) => Err(self.never_trips()),
+            _ => Err(self.is_unsteady()),
         }
+    }
+
+    /// It still stands on its switch when it has backed off.
+    pub fn sticks(&self) -> String {
+        let back = self.shown(self.plan.back_off_mm);
+        self.failure(&format!(
+            "is still on {back} behind its edge: it sticks, or back_off is too short"
+        ))
+    }
+
+    /// Its switch was not released.
+    pub fn stays_on(&self) -> String {
+        let way = self.shown(self.search_mm());
+        self.failure(&format!(
+            "is on and was not released within {way}: it sticks, or invert is wrong"
+        ))
+    }
+
+    /// Its switch did not trip.
+    pub fn never_trips(&self) -> String {
+        let way = self.shown(self.search_mm());
+        self.failure(&format!(
+            "did not trip within {way}: it does not work, or the search goes away from it"
+        ))
+    }
+
+    /// It would have to go on alone for longer than its gantry may be askew.
+    pub fn is_askew(&self, max_skew_mm: f64) -> String {
+        let most = self.shown(max_skew_mm);
+        self.failure(&format!(
+            "did not trip within {most} of where another joint of the gantry did: it does not work, or the gantry stands more \
+             askew than max_skew allows"
+        ))
+    }
+
+    /// Its switch trips now and then.
+    pub fn is_unsteady(&self) -> String {
+        self.failure("did not trip again: it does not work")
+    }
+
+    fn no_pulse(&self) -> String {
+        let index = self.plan.index;
+        let within = self.shown(index.map_or(0.0, |index| index.within_mm));
+        format!(
+            "homing {}: no index pulse came on input {} within {within} behind the switch",
+            self.name,
+            index.map_or(0, |index| index.input)
+        )
     }
 
     fn failure(&self, what: &str) -> String {
         format!(
             "homing {}: the switch on input {} {what}",
-            self.letter, self.plan.input
+            self.name, self.plan.input
         )
     }
 

@@ -1,9 +1,10 @@
-//! Homing: each axis looks for its switch, takes the place of its edge, and goes home. A stream of blocks that goes on by
+//! Homing: each axis looks for its switch, takes the place of its edge, and goes home; those of one number at once. A stream of blocks that goes on by
 //! what the machine answers, in front of the program's.
 
 mod axis;
 #[cfg(test)]
 mod tests;
+mod together;
 
 use std::collections::VecDeque;
 
@@ -12,9 +13,10 @@ use tandem_host::Lead;
 use tandem_machine::{AxisHoming, Machine, SwitchHoming};
 use tandem_rings::{Rest, RestCause};
 use tandem_rough::Source;
-use tandem_sdk::{AxisVector, Block, BlockKind, Edge, Event, EventKind, PathMode, StopOn};
+use tandem_sdk::{Axes, AxisVector, Block, BlockKind, Edge, Event, EventKind, PathMode, StopOn};
 
 use axis::{Axis, Step};
+use together::{Ask, Together};
 
 /// How long a switch may bounce behind the back-off, s.
 const BOUNCE_S: f64 = 0.2;
@@ -23,11 +25,30 @@ const BOUNCE_S: f64 = 0.2;
 pub const HOMING: Lead =
     |machine, program| Box::new(Homing::new(machine, &machine.homing, program));
 
-/// Homes axes one after the other, then hands out another stream.
+/// Axes that home at a time.
+enum Work {
+    /// One, and its step.
+    One(Axis, Step),
+    /// Several, by switches.
+    Several(Together),
+}
+
+impl Work {
+    /// What is handed out before anything is known.
+    fn begin_anew(&mut self) {
+        match self {
+            Self::One(axis, step) => *step = axis.first(),
+            Self::Several(together) => together.begin_anew(),
+        }
+    }
+}
+
+/// Homes axes, those that go together at once and the others one after the other, then hands out another stream.
 pub struct Homing {
-    axes: VecDeque<Axis>,
+    work: VecDeque<Work>,
+    /// The machine's axes, for the length of a way of several.
+    machine_axes: Axes,
     position: AxisVector,
-    step: Step,
     /// The machine is to answer before anything follows.
     awaiting: bool,
     failure: Option<String>,
@@ -45,13 +66,34 @@ impl Homing {
         plan: &[AxisHoming],
         program: Option<Box<dyn Source + Send>>,
     ) -> Self {
-        let axes: VecDeque<_> = plan
-            .iter()
-            .map(|homing| Axis::new(machine, homing))
-            .collect();
+        let mut groups: Vec<Vec<&AxisHoming>> = vec![];
+        for homing in plan {
+            match groups.last_mut() {
+                Some(group) if group.iter().all(|other| homing.goes_with(other)) => {
+                    group.push(homing);
+                }
+                _ => groups.push(vec![homing]),
+            }
+        }
+        let work = groups.into_iter().map(|group| {
+            let mut axes: Vec<_> = group
+                .into_iter()
+                .map(|homing| Axis::new(machine, homing))
+                .collect();
+            match axes.pop() {
+                Some(axis) if axes.is_empty() => {
+                    let first = axis.first();
+                    Work::One(axis, first)
+                }
+                last => {
+                    axes.extend(last);
+                    Work::Several(Together::new(axes))
+                }
+            }
+        });
         Self {
-            step: axes.front().map_or(Step::Look, Axis::first),
-            axes,
+            work: work.collect(),
+            machine_axes: machine.axes,
             position: machine.start,
             awaiting: false,
             failure: None,
@@ -61,8 +103,61 @@ impl Homing {
         }
     }
 
-    /// Hands out the next step of `axis`.
-    fn begin(&mut self, axis: &Axis, items: &mut Vec<Item>) {
+    /// Hands out what axes that home together ask for.
+    fn begin_several(&mut self, together: &mut Together, items: &mut Vec<Item>) {
+        self.awaiting = true;
+        for ask in together.asks(&self.position) {
+            match ask {
+                Ask::Read { plan, on, within_s } => {
+                    let mode = match (on, on == Some(plan.inverted)) {
+                        (None, _) => InputMode::Immediate,
+                        (_, true) => InputMode::Low,
+                        (_, false) => InputMode::High,
+                    };
+                    items.push(self.read(&plan, mode, within_s));
+                }
+                Ask::Move {
+                    end,
+                    seconds,
+                    stop_on,
+                } => self.travel_together(&end, seconds, stop_on, items),
+                Ask::Tell { kind, axis, value } => {
+                    items.push(self.event(kind, axis, value));
+                }
+                Ask::Done => self.awaiting = false,
+            }
+        }
+    }
+
+    /// A straight line of several axes, which takes so many seconds; a rapid where it is to take as few as it can.
+    fn travel_together(
+        &mut self,
+        end: &AxisVector,
+        seconds: Option<f64>,
+        stop_on: StopOn,
+        items: &mut Vec<Item>,
+    ) {
+        let length_mm = self.machine_axes.path_length(&(*end - self.position));
+        if length_mm == 0.0 {
+            return;
+        }
+        let mut block = Block::at(self.position);
+        block.end = *end;
+        (block.kind, block.feed_mm_per_s) = match seconds {
+            Some(seconds) => (BlockKind::Line, length_mm / seconds),
+            None => (BlockKind::Rapid, f64::INFINITY),
+        };
+        block.path_mode = PathMode::ExactStop;
+        (block.index, block.length_mm, block.stop_on) = (self.blocks, length_mm, stop_on);
+        if stop_on.edge == Edge::None {
+            self.position = block.end;
+        }
+        self.blocks += 1;
+        items.push(Item::Block(block, None));
+    }
+
+    /// Hands out the next step of `axis`; whether it is the last one.
+    fn begin(&mut self, axis: &Axis, step: Step, items: &mut Vec<Item>) -> bool {
         let plan = &axis.plan;
         let (trip, release) = if plan.inverted {
             (Edge::Falling, Edge::Rising)
@@ -71,10 +166,10 @@ impl Homing {
         };
         let (fast, slow) = (plan.search_mm_per_s.abs(), plan.latch_mm_per_s);
         self.awaiting = true;
-        match self.step {
+        match step {
             Step::HandOver => {
                 let within_s = axis.drive.map_or(0.0, |drive| drive.within_s);
-                items.push(self.event(EventKind::HomeByDrive, axis, within_s));
+                items.push(self.event(EventKind::HomeByDrive, axis.index, within_s));
             }
             Step::Look => items.push(self.read(plan, InputMode::Immediate, 0.0)),
             Step::Search => self.travel(axis, axis.search_mm(), fast, trip, items),
@@ -95,7 +190,16 @@ impl Homing {
                 items.push(self.read(plan, released, BOUNCE_S));
             }
             Step::Latch => self.travel(axis, axis.latch_mm(), slow, trip, items),
-            Step::Correct { by_mm } => items.push(self.event(EventKind::Correct, axis, by_mm)),
+            Step::Index => {
+                let Some(index) = plan.index else {
+                    return false;
+                };
+                let way_mm = axis.direction() * index.within_mm;
+                self.travel_to(axis, way_mm, slow, (index.input, Edge::Rising), items);
+            }
+            Step::Correct { by_mm } => {
+                items.push(self.event(EventKind::Correct, axis.index, by_mm));
+            }
             Step::GoHome => {
                 self.travel(
                     axis,
@@ -109,12 +213,12 @@ impl Homing {
                 if let Some(Item::Block(block, _)) = items.last_mut() {
                     block.end[axis.index] = axis.home_mm;
                 }
-                items.push(self.event(EventKind::Homed, axis, 0.0));
-                self.axes.pop_front();
-                (self.step, self.awaiting) =
-                    (self.axes.front().map_or(Step::Look, Axis::first), false);
+                items.push(self.event(EventKind::Homed, axis.index, 0.0));
+                self.awaiting = false;
+                return true;
             }
         }
+        false
     }
 
     fn read(&self, plan: &SwitchHoming, mode: InputMode, timeout_s: f64) -> Item {
@@ -127,12 +231,12 @@ impl Homing {
         })
     }
 
-    fn event(&self, kind: EventKind, axis: &Axis, value: f64) -> Item {
+    fn event(&self, kind: EventKind, axis: usize, value: f64) -> Item {
         Item::Event(Event::new(
             kind,
             0,
             self.blocks,
-            (axis.index as u32).cast_signed(),
+            (axis as u32).cast_signed(),
             value,
         ))
     }
@@ -144,6 +248,18 @@ impl Homing {
         by_mm: f64,
         feed_mm_per_s: f64,
         edge: Edge,
+        items: &mut Vec<Item>,
+    ) {
+        self.travel_to(axis, by_mm, feed_mm_per_s, (axis.plan.input, edge), items);
+    }
+
+    /// The same, until this edge.
+    fn travel_to(
+        &mut self,
+        axis: &Axis,
+        by_mm: f64,
+        feed_mm_per_s: f64,
+        (input, edge): (u32, Edge),
         items: &mut Vec<Item>,
     ) {
         if by_mm == 0.0 {
@@ -160,7 +276,7 @@ impl Homing {
         (block.index, block.length_mm, block.feed_mm_per_s) =
             (self.blocks, by_mm.abs(), feed_mm_per_s);
         block.stop_on = StopOn {
-            input: axis.plan.input,
+            input,
             edge,
             miss_is_fault: 0,
         };
@@ -195,7 +311,7 @@ impl Homing {
                 Item::Event(event) => event.before_block += self.blocks,
                 Item::Wait(wait) => wait.before_block += self.blocks,
                 Item::Command(command) => command.before_block += self.blocks,
-                Item::End => {}
+                Item::Stated { .. } | Item::End => {}
             }
         }
         Ok(more)
@@ -210,11 +326,24 @@ impl Source for Homing {
         if self.awaiting {
             return Ok(true);
         }
-        match self.axes.front().copied() {
-            Some(axis) => self.begin(&axis, items),
-            None => return self.program_items(items),
+        let Some(mut work) = self.work.pop_front() else {
+            return self.program_items(items);
+        };
+        let over = match &mut work {
+            Work::One(axis, step) => self.begin(axis, *step, items),
+            Work::Several(together) => {
+                self.begin_several(together, items);
+                together.is_over()
+            }
+        };
+        if !over {
+            self.work.push_front(work);
         }
         Ok(true)
+    }
+
+    fn streams(&self) -> bool {
+        self.work.is_empty() && self.program.as_ref().is_some_and(Source::streams)
     }
 
     fn period(&mut self) {
@@ -226,26 +355,29 @@ impl Source for Homing {
     }
 
     fn may_go_on(&mut self, driven: bool) -> bool {
-        let program = self.program.as_mut().filter(|_| self.axes.is_empty());
+        let program = self.program.as_mut().filter(|_| self.work.is_empty());
         program.is_none_or(|program| program.may_go_on(driven))
     }
 
     fn provide_input(&mut self, value: f64) {
-        let Some(axis) = self.axes.front() else {
+        let Some(work) = self.work.front_mut() else {
             return self
                 .program
                 .iter_mut()
                 .for_each(|program| program.provide_input(value));
         };
         self.awaiting = false;
-        match axis.after_input(self.step, value) {
-            Ok(step) => self.step = step,
-            Err(why) => self.fail(why),
+        let done = match work {
+            Work::One(axis, step) => axis.after_input(*step, value).map(|next| *step = next),
+            Work::Several(together) => together.after_input(value),
+        };
+        if let Err(why) = done {
+            self.fail(why);
         }
     }
 
     fn provide_rest(&mut self, rest: &Rest) -> bool {
-        let Some(axis) = self.axes.front() else {
+        let Some(work) = self.work.front_mut() else {
             return self
                 .program
                 .as_mut()
@@ -259,10 +391,17 @@ impl Source for Homing {
         if rest.cause == RestCause::Corrected {
             self.corrected = Some(*rest);
         }
-        match axis.after_rest(self.step, rest) {
-            Ok(step) => self.step = step,
-            Err(why) => self.fail(why),
+        if rest.cause == RestCause::Abort {
+            work.begin_anew();
+            return false;
         }
-        rest.cause != RestCause::Abort
+        let done = match work {
+            Work::One(axis, step) => axis.after_rest(*step, rest).map(|next| *step = next),
+            Work::Several(together) => together.after_rest(rest),
+        };
+        if let Err(why) = done {
+            self.fail(why);
+        }
+        true
     }
 }

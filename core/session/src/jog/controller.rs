@@ -297,7 +297,7 @@ impl JogController {
         } else {
             0
         };
-        controls.jog.most_periods.store(most, Relaxed);
+        controls.jog.max_periods.store(most, Relaxed);
         Ok(block)
     }
 
@@ -371,7 +371,7 @@ impl Inner {
     /// Nothing moves: nothing needs to be kept alive, and nothing to be let go.
     fn disarm(&self) {
         if let Some(controls) = &self.controls {
-            controls.jog.most_periods.store(0, Relaxed);
+            controls.jog.max_periods.store(0, Relaxed);
             controls.jog.let_go.store(false, Relaxed);
         }
     }

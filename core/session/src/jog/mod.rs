@@ -17,4 +17,5 @@ mod tests;
 
 pub use controller::JogController;
 pub use message::{Jog, JogEnd, JogMessage, JogRest, Reach, ReachMessage};
+pub(crate) use session::Jogging;
 pub use session::{JogInput, JogSession};

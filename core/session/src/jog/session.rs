@@ -78,6 +78,7 @@ impl<'a> JogSession<'a> {
             jogs: Arc::clone(&self.jogs),
             input: Arc::clone(&self.input),
             standing: Standing::default(),
+            stays: true,
         };
         let (machine, name) = (self.machine.clone(), "jogging".to_string());
         let run = Run::of_source(
@@ -115,14 +116,26 @@ impl<'a> JogSession<'a> {
     }
 }
 
-/// The session as the rough loop pulls it.
-struct Jogging {
+/// Jogs as the rough loop pulls them.
+pub struct Jogging {
     jogs: Arc<JogController>,
     input: SharedInput,
     standing: Standing,
+    /// It waits for jogs to come; else it is over when none moves.
+    stays: bool,
 }
 
 impl Jogging {
+    /// Those that wait, until none does and the machine stands.
+    pub fn until_still(jogs: &Arc<JogController>, input: Box<dyn JogInput>) -> Self {
+        Self {
+            jogs: Arc::clone(jogs),
+            input: Arc::new(Mutex::new(input)),
+            standing: Standing::default(),
+            stays: false,
+        }
+    }
+
     fn input(&self) -> MutexGuard<'_, Box<dyn JogInput>> {
         // A panic of the input leaves the jogs as they were.
         self.input.lock().unwrap_or_else(PoisonError::into_inner)
@@ -157,7 +170,11 @@ impl Source for Jogging {
         if !items.is_empty() {
             self.standing.moves();
         }
-        Ok(more)
+        Ok(if self.stays {
+            more
+        } else {
+            !items.is_empty() || !self.jogs.is_still()
+        })
     }
 
     fn provide_input(&mut self, _value: f64) {}

@@ -82,7 +82,7 @@ fn the_same_jog_again_is_a_keep_alive_and_another_one_stops_it() {
     let rig = Rig::new();
     rig.on('x', true).unwrap();
     assert_eq!(rig.begins().unwrap()[0], 250.0);
-    assert_eq!(rig.controls.jog.most_periods.load(Relaxed), 200);
+    assert_eq!(rig.controls.jog.max_periods.load(Relaxed), 200);
     let beats = rig.controls.jog.beats.load(Relaxed);
     rig.on('x', true).unwrap();
     assert!(!rig.is_let_go() && rig.controls.jog.beats.load(Relaxed) == beats + 1);
@@ -125,7 +125,7 @@ fn steps_wait_for_each_other_and_are_forgotten_at_a_stop() {
     }
     assert_eq!(rig.begins().unwrap()[0], 100.0);
     assert_eq!(
-        rig.controls.jog.most_periods.load(Relaxed),
+        rig.controls.jog.max_periods.load(Relaxed),
         0,
         "a step needs no keep-alive"
     );

@@ -14,6 +14,8 @@ use super::session::Answer;
 
 /// Bytes that are read of a client at a time.
 const CHUNK: usize = 4096;
+/// Most lines of a client that are answered in a round: what it sends without end waits, and the others do not.
+const MAX_LINES: usize = 8;
 /// How long a client may take to read its last line.
 const PATIENCE: Duration = Duration::from_secs(5);
 /// How long a client may take to say who it is.
@@ -37,11 +39,26 @@ pub struct Client {
     pub door: usize,
     is_guest: bool,
     incoming: Vec<u8>,
+    /// So many bytes of it hold no end of a line.
+    looked_at: usize,
+    /// Whole lines wait in it for the next round.
+    owes: bool,
+    hearing: Hearing,
     outbox: Outbox,
     session: Box<dyn Talk>,
     phase: Phase,
     /// Since when it is in its phase.
     since: Instant,
+}
+
+/// Whether it goes on speaking.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Hearing {
+    Speaks,
+    /// It says no more, and waits for answers.
+    Listens,
+    /// Its answers are there: with the next round it leaves.
+    Parts,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,6 +90,9 @@ impl Client {
             door,
             is_guest,
             incoming: vec![],
+            looked_at: 0,
+            owes: false,
+            hearing: Hearing::Speaks,
             outbox,
             session,
             phase: Phase::Talking,
@@ -118,15 +138,19 @@ impl Client {
     pub fn interest(&self) -> (&dyn Stream, PollFlags) {
         let mut flags = PollFlags::empty();
         // One that has said its last word would be ready for reading all the time.
-        let reads = self.phase != Phase::Leaving && self.session.takes_bytes();
+        let reads = self.phase != Phase::Leaving
+            && self.hearing == Hearing::Speaks
+            && self.session.takes_bytes();
         flags.set(PollFlags::IN, reads);
         flags.set(PollFlags::OUT, !self.outbox.is_empty());
         (self.stream.as_ref(), flags)
     }
 
-    /// When its next status line is due.
+    /// When it is to be looked at again, though it says nothing: its next status line, or lines that wait.
     pub fn due(&self) -> Option<Instant> {
-        self.session.due().filter(|_| self.phase == Phase::Talking)
+        let owed = (self.owes || self.hearing == Hearing::Parts).then_some(self.since);
+        let due = [owed, self.session.due()].into_iter().flatten().min();
+        due.filter(|_| self.phase == Phase::Talking)
     }
 
     /// Reads, answers, sends: whatever can be done without waiting. A stranger that names the token becomes an owner
@@ -223,6 +247,19 @@ impl Client {
         if self.phase == Phase::Talking && !self.session.takes_bytes() {
             return;
         }
+        if self.phase == Phase::Talking && self.owes {
+            self.lines(lease, now);
+            return;
+        }
+        if self.phase == Phase::Talking && self.hearing != Hearing::Speaks {
+            // What it waited for is handed out behind this round.
+            if self.hearing == Hearing::Parts {
+                self.leave(now);
+            } else if !self.session.is_busy() {
+                self.hearing = Hearing::Parts;
+            }
+            return;
+        }
         let mut chunk = [0; CHUNK];
         // One chunk a round: a client that never stops sending does not keep the others waiting.
         match self.stream.read(&mut chunk) {
@@ -247,6 +284,7 @@ impl Client {
     /// It says no more; what it has asked for is still sent.
     fn hang_up(&mut self, now: Instant) {
         match self.phase {
+            Phase::Talking if self.session.is_busy() => self.hearing = Hearing::Listens,
             Phase::Talking => self.leave(now),
             Phase::Leaving => {}
             _ => self.phase = Phase::Gone,
@@ -254,20 +292,30 @@ impl Client {
     }
 
     fn lines(&mut self, lease: &mut Lease, now: Instant) {
-        while self.phase == Phase::Talking {
+        self.owes = false;
+        for _ in 0..MAX_LINES {
+            if self.phase != Phase::Talking {
+                return;
+            }
             let most = self.session.max_line_bytes();
-            let end = self.incoming.iter().position(|byte| *byte == b'\n');
-            let answer = match end {
+            let unseen = &self.incoming[self.looked_at..];
+            let end = unseen.iter().position(|byte| *byte == b'\n');
+            let answer = match end.map(|end| self.looked_at + end) {
                 Some(end) if end <= most => {
                     let line: Vec<u8> = self.incoming.drain(..=end).collect();
+                    self.looked_at = 0;
                     self.session
                         .line(&String::from_utf8_lossy(&line[..end]), lease, now)
                 }
-                None if self.incoming.len() <= most => return,
+                None if self.incoming.len() <= most => {
+                    self.looked_at = self.incoming.len();
+                    return;
+                }
                 _ => self.session.too_long(),
             };
             self.take(&answer, now);
         }
+        self.owes = true;
     }
 
     fn take(&mut self, answer: &Answer, now: Instant) {

@@ -7,6 +7,7 @@ use super::hub::OperatorHub;
 use super::lease::Lease;
 use super::reply::{self, Problem};
 use super::session::{Answer, Session};
+use super::token::Tokens;
 
 /// One client's conversation, in whichever protocol. On the thread that serves clients.
 pub trait Talk: Send {
@@ -35,6 +36,10 @@ pub trait Talk: Send {
     /// Takes bytes of a raw client.
     fn bytes(&mut self, _bytes: &[u8], _lease: &mut Lease, _now: Instant) -> Answer {
         Answer::default()
+    }
+    /// Whether answers are still to come.
+    fn is_busy(&self) -> bool {
+        false
     }
     /// What there is to say though nobody has asked; called once a round.
     fn turn(&mut self, _lease: &mut Lease, _now: Instant) -> String {
@@ -72,8 +77,8 @@ pub trait Talk: Send {
 
 /// What the thread that serves clients needs of the machine.
 pub trait House: Send + Sync {
-    /// Somebody has come, whose first line must name `token`.
-    fn newcomer(&self, number: u64, token: Option<String>) -> Box<dyn Talk>;
+    /// Somebody has come, whose first line must name one of `tokens`.
+    fn newcomer(&self, number: u64, tokens: Option<Arc<Tokens>>) -> Box<dyn Talk>;
     /// A sender of grbl's protocol has come, at the door named `place`; none where nobody lives here who speaks it.
     fn sender(&self, _number: u64, _place: &str) -> Option<Box<dyn Talk>> {
         None
@@ -98,10 +103,10 @@ pub trait House: Send + Sync {
 pub struct OneRun(pub Arc<OperatorHub>);
 
 impl House for OneRun {
-    fn newcomer(&self, number: u64, token: Option<String>) -> Box<dyn Talk> {
+    fn newcomer(&self, number: u64, tokens: Option<Arc<Tokens>>) -> Box<dyn Talk> {
         Box::new(Protocol1 {
             hub: Arc::clone(&self.0),
-            session: Session::new(number, token),
+            session: Session::new(number, tokens),
         })
     }
 

@@ -5,10 +5,12 @@ use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::os::fd::{AsFd, BorrowedFd};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use super::pty::PtyDoor;
+use super::role::Role;
 use super::socket_file::{self, SocketFile};
-use super::token;
+use super::token::Tokens;
 
 /// Bytes that the system keeps for a client: telemetry that waits longer is old.
 const SEND_BUFFER_BYTES: usize = 16 * 1024;
@@ -22,6 +24,8 @@ pub struct Listen {
     pub tcp: Option<SocketAddr>,
     /// File of the token that clients over TCP name.
     pub token_file: Option<PathBuf>,
+    /// Files of the tokens that let clients over TCP do less.
+    pub role_token_files: Vec<(PathBuf, Role)>,
     /// Loopback address and port for senders of grbl's protocol, who name no token.
     pub grbl_tcp: Option<SocketAddr>,
     /// Path of the link to a terminal of our own, for senders of grbl's protocol.
@@ -51,8 +55,8 @@ pub trait Stream: Read + Write + Send {
 pub struct Comer {
     /// Its end.
     pub stream: Box<dyn Stream>,
-    /// The token that its first line must name.
-    pub token: Option<String>,
+    /// The tokens of which its first line must name one.
+    pub tokens: Option<Arc<Tokens>>,
     /// Whether it runs as another user.
     pub is_guest: bool,
     /// For a sender of grbl's protocol: the place where it has come in, in words.
@@ -84,8 +88,8 @@ pub enum Door {
         UnixListener,
         #[allow(dead_code, reason = "the file goes with it")] SocketFile,
     ),
-    /// Whoever knows the token.
-    Tcp(TcpListener, String),
+    /// Whoever knows a token.
+    Tcp(TcpListener, Arc<Tokens>),
     /// Senders of grbl's protocol, from this computer.
     GrblTcp(TcpListener),
     /// Senders of grbl's protocol that open a terminal whose mode lets the owner in alone.
@@ -128,16 +132,16 @@ impl Door {
                 let is_guest = !is_owner(&stream);
                 Ok(Comer {
                     stream: Box::new(stream),
-                    token: None,
+                    tokens: None,
                     is_guest,
                     sender_at: None,
                 })
             }
-            Self::Tcp(listener, token) => {
+            Self::Tcp(listener, tokens) => {
                 let (stream, _) = comer(listener)?;
                 Ok(Comer {
                     stream: Box::new(stream),
-                    token: Some(token.clone()),
+                    tokens: Some(Arc::clone(tokens)),
                     is_guest: false,
                     sender_at: None,
                 })
@@ -146,14 +150,14 @@ impl Door {
                 let (stream, from) = comer(listener)?;
                 Ok(Comer {
                     stream: Box::new(stream),
-                    token: None,
+                    tokens: None,
                     is_guest: false,
                     sender_at: Some(from.to_string()),
                 })
             }
             Self::GrblPty(pty) => Ok(Comer {
                 stream: pty.accept()?,
-                token: None,
+                tokens: None,
                 is_guest: false,
                 sender_at: Some(pty.place()),
             }),
@@ -231,8 +235,11 @@ fn tcp(address: SocketAddr, listen: &Listen) -> Result<Door, String> {
         .token_file
         .as_ref()
         .ok_or("a TCP address needs a token file: anybody on this computer reaches it")?;
-    let token = token::of_file(file)?;
-    Ok(Door::Tcp(listener, token))
+    let others = listen.role_token_files.iter();
+    let files = [(file.as_path(), Role::SetUp)]
+        .into_iter()
+        .chain(others.map(|(file, role)| (file.as_path(), *role)));
+    Ok(Door::Tcp(listener, Arc::new(Tokens::of_files(files)?)))
 }
 
 #[cfg(test)]

@@ -167,7 +167,7 @@ pub fn parse(text: &str) -> Result<Request, Problem> {
         (Some(request), None) => Ok(request),
         (None, _) => Err(Problem::malformed(
             "the whole line",
-            "it has none of command, subscribe, status, lease, jog",
+            "it has none of command, subscribe, status, lease, jog, token",
         )),
         (Some(_), Some(_)) => Err(Problem::malformed(
             "the whole line",

@@ -212,7 +212,7 @@ impl Room {
                 self.comers += 1;
                 let talk = match &comer.sender_at {
                     Some(place) => self.house.sender(self.comers, place),
-                    None => Some(self.house.newcomer(self.comers, comer.token)),
+                    None => Some(self.house.newcomer(self.comers, comer.tokens)),
                 };
                 let Some(talk) = talk else { continue };
                 let mut client = Client::new(comer.stream, comer.is_guest, talk, at, now);
@@ -262,6 +262,8 @@ impl Room {
     fn farewell(&mut self) {
         self.doors.clear();
         let start = Instant::now();
+        // What was said until now comes before the farewell.
+        self.round(start);
         for client in &mut self.clients {
             client.dismiss(start);
         }

@@ -53,10 +53,14 @@ fn room() -> Room {
     )
 }
 
+fn tokens_of(token: &str) -> Arc<crate::operator::Tokens> {
+    Arc::new(crate::operator::Tokens::of_owner(token.to_string()))
+}
+
 impl Room {
     fn comes(&mut self, stream: Box<dyn Stream>, token: Option<&str>, now: Instant) {
         self.comers += 1;
-        let talk = self.house.newcomer(self.comers, token.map(str::to_string));
+        let talk = self.house.newcomer(self.comers, token.map(tokens_of));
         self.clients.push(Client::new(stream, false, talk, 0, now));
     }
 

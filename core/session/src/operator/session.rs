@@ -1,5 +1,6 @@
 //! One client's conversation, without its socket.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use serde_json::json;
@@ -9,7 +10,8 @@ use super::hub::OperatorHub;
 use super::lease::{ANSWER_WITHIN, Lease};
 use super::reply::{self, Problem};
 use super::request::{LeaseWord, Request, parse};
-use super::token;
+use super::role::Role;
+use super::token::Tokens;
 use crate::jog::JogMessage;
 
 /// Most clients that are known, at one door.
@@ -29,8 +31,9 @@ pub struct Answer {
 pub struct Session {
     /// The client's number.
     pub client: u64,
-    /// The token that the first line must name.
-    token: Option<String>,
+    /// The tokens of which the first line must name one.
+    tokens: Option<Arc<Tokens>>,
+    role: Role,
     /// Whether its door has a place for one more who has named the token.
     pub has_place: bool,
     lines: u64,
@@ -44,11 +47,12 @@ struct Subscription {
 }
 
 impl Session {
-    /// A client that has just come; over TCP its first line names `token`.
-    pub fn new(client: u64, token: Option<String>) -> Self {
+    /// A client that has just come; over TCP its first line names one of `tokens`.
+    pub fn new(client: u64, tokens: Option<Arc<Tokens>>) -> Self {
         Self {
             client,
-            token,
+            tokens,
+            role: Role::SetUp,
             has_place: true,
             lines: 0,
             subscription: None,
@@ -57,7 +61,7 @@ impl Session {
 
     /// Whether the client has said who it is, or need not.
     pub fn is_known(&self) -> bool {
-        self.token.is_none()
+        self.tokens.is_none()
     }
 
     /// Answers a line.
@@ -83,10 +87,10 @@ impl Session {
                 };
             }
         };
-        if let Some(token) = self.token.take() {
-            let answer = self.introduce(&token, &request);
+        if let Some(tokens) = self.tokens.take() {
+            let answer = self.introduce(&tokens, &request);
             // A stranger stays one: it gets none of the owner's places while its last line is on the way.
-            self.token = answer.last.then_some(token);
+            self.tokens = answer.last.then_some(tokens);
             return answer;
         }
         match self.grant(&request, hub, lease, now) {
@@ -130,25 +134,26 @@ impl Session {
         self.subscription.as_ref().map(|s| s.due)
     }
 
-    fn introduce(&self, expected: &str, request: &Request) -> Answer {
-        match request {
-            Request::Token(given) if token::is_same(given, expected) => {
-                if !self.has_place {
-                    return self.close(&Problem::crowded(MAX_OWNERS));
-                }
-                Answer {
-                    line: reply::ok(&json!({ "client": self.client })),
-                    last: false,
-                }
-            }
-            Request::Token(_) => self.close(&Problem::refused(
-                "key \"token\"",
-                "it is another token".to_string(),
-            )),
-            _ => self.close(&Problem::refused(
+    fn introduce(&mut self, expected: &Tokens, request: &Request) -> Answer {
+        let Request::Token(given) = request else {
+            return self.close(&Problem::refused(
                 "the whole line",
                 "the first line over TCP is {\"token\":\"…\"}".to_string(),
-            )),
+            ));
+        };
+        let Some(role) = expected.role_of(given) else {
+            return self.close(&Problem::refused(
+                "key \"token\"",
+                "it is another token".to_string(),
+            ));
+        };
+        if !self.has_place {
+            return self.close(&Problem::crowded(MAX_OWNERS));
+        }
+        self.role = role;
+        Answer {
+            line: reply::ok(&json!({ "client": self.client })),
+            last: false,
         }
     }
 
@@ -159,6 +164,7 @@ impl Session {
         lease: &mut Lease,
         now: Instant,
     ) -> Result<String, Problem> {
+        self.may(request)?;
         match request {
             Request::Command(command) => self.command(*command, hub, lease),
             Request::Status => Ok(reply::status(&hub.status())),
@@ -178,15 +184,28 @@ impl Session {
         }
     }
 
+    /// Whoever may watch looks, and stops the machine.
+    fn may(&self, request: &Request) -> Result<(), Problem> {
+        let (drives, place) = match request {
+            Request::Command(command) => (!is_free(*command), "key \"command\""),
+            Request::Jog(words) => (words.is_some(), "key \"jog\""),
+            Request::Lease(_) => (true, "key \"lease\""),
+            Request::Subscribe(_) | Request::Status | Request::Token(_) => (false, ""),
+        };
+        if drives && self.role < Role::Operate {
+            let why = "its token lets it watch and stop the machine, and no more";
+            return Err(Problem::refused(place, why.to_string()));
+        }
+        Ok(())
+    }
+
     fn command(
         &self,
         command: Command,
         hub: &OperatorHub,
         lease: &Lease,
     ) -> Result<String, Problem> {
-        // Safety needs no lease.
-        let free = matches!(command, Command::Hold | Command::EmergencyStop);
-        if !free && !lease.is_held_by(self.client) {
+        if !is_free(command) && !lease.is_held_by(self.client) {
             return Err(Problem::refused("key \"command\"", without_lease(lease)));
         }
         let tick = hub
@@ -234,6 +253,11 @@ impl Session {
             LeaseWord::Release => Err(refused("this client does not hold the lease".to_string())),
         }
     }
+}
+
+/// Safety needs no lease, and no role.
+fn is_free(command: Command) -> bool {
+    matches!(command, Command::Hold | Command::EmergencyStop)
 }
 
 fn held_by(holder: u64) -> String {

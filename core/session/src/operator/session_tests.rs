@@ -127,7 +127,7 @@ fn a_malformed_line_is_the_last() {
 #[test]
 fn over_tcp_the_first_line_is_the_token() {
     let mut room = Room::new();
-    let token = || Some("0123456789abcdef".to_string());
+    let token = || Some(Arc::new(Tokens::of_owner("0123456789abcdef".to_string())));
     for (line, why) in [
         (r#"{"token":"0123456789abcdee"}"#, "another token"),
         (r#"{"command":"hold"}"#, "the first line over TCP"),

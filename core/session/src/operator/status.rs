@@ -109,15 +109,15 @@ pub struct Counters {
 impl Counters {
     /// As the fine loop last published them.
     pub fn of(status: &Status) -> Self {
-        let counts = &status.counts;
+        let counted = status.counts.load();
         Self {
-            samples: counts.samples.load(Relaxed),
-            guard_stops: counts.guard_stops.load(Relaxed),
-            limit_violations: counts.limit_violations.load(Relaxed),
-            governed_samples: counts.governed_samples.load(Relaxed),
-            starvations: counts.starvations.load(Relaxed),
-            late_ratios: counts.late_ratios.load(Relaxed),
-            missed_periods: counts.missed_periods.load(Relaxed),
+            samples: counted.samples,
+            guard_stops: counted.guard_stops,
+            limit_violations: counted.limit_violations,
+            governed_samples: counted.governed_samples,
+            starvations: counted.starvations,
+            late_ratios: counted.late_ratios,
+            missed_periods: counted.missed_periods,
             lost_samples: status.lost_samples.load(Relaxed),
         }
     }

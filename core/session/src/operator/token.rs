@@ -1,4 +1,4 @@
-//! The token that a client over TCP names in its first line.
+//! The tokens of which a client over TCP names one in its first line, and what each lets it do.
 
 use std::fmt::Write as _;
 use std::fs::{self, OpenOptions};
@@ -8,10 +8,68 @@ use std::path::Path;
 
 use rustix::rand::{GetRandomFlags, getrandom};
 
+use super::role::Role;
+
 /// Random bytes of a new token.
 const BYTES: usize = 32;
 /// Shortest token that is taken from a file.
 const MIN_CHARACTERS: usize = 16;
+
+/// Tokens, each with what it lets a client do.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Tokens(Vec<(String, Role)>);
+
+impl Tokens {
+    /// One token that lets everything be done.
+    pub fn of_owner(token: String) -> Self {
+        Self(vec![(token, Role::SetUp)])
+    }
+
+    /// The tokens of files, each made where it does not exist.
+    ///
+    /// # Errors
+    /// What is wrong with a file, as [`of_file`] says; two have the same token.
+    pub fn of_files<'a>(files: impl IntoIterator<Item = (&'a Path, Role)>) -> Result<Self, String> {
+        let mut all = Self::default();
+        for (path, role) in files {
+            all.add(path, role)?;
+        }
+        Ok(all)
+    }
+
+    /// Adds the token of a file.
+    ///
+    /// # Errors
+    /// What is wrong with the file; it is one of the tokens that there are.
+    pub fn add(&mut self, path: &Path, role: Role) -> Result<(), String> {
+        let token = of_file(path)?;
+        if let Some(same) = self.role_of(&token) {
+            return Err(format!(
+                "{}: whoever names this token may {} already: it needs another one",
+                path.display(),
+                same.name()
+            ));
+        }
+        self.0.push((token, role));
+        Ok(())
+    }
+
+    /// All of them.
+    pub fn all(&self) -> &[(String, Role)] {
+        &self.0
+    }
+
+    /// What `given` lets a client do; none where it is no token. It takes a time that does not tell which it is like.
+    pub fn role_of(&self, given: &str) -> Option<Role> {
+        self.0.iter().fold(None, |found, (token, role)| {
+            if is_same(given, token) {
+                Some(*role)
+            } else {
+                found
+            }
+        })
+    }
+}
 
 /// The token of `path`; a random one in a new file of mode 0600 where there is none.
 ///
@@ -105,6 +163,23 @@ mod tests {
         fs::set_permissions(&path, fs::Permissions::from_mode(0o600)).unwrap();
         fs::write(&path, "secret\n").unwrap();
         assert!(of_file(&path).unwrap_err().contains("fewer than 16"));
+    }
+
+    #[test]
+    fn each_token_lets_do_what_its_file_is_for_and_no_two_are_the_same() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = |name: &str| folder.path().join(name);
+        let (set_up, watch) = (file("set-up"), file("watch"));
+        let files = [(&*set_up, Role::SetUp), (&*watch, Role::Watch)];
+        let tokens = Tokens::of_files(files).unwrap();
+        for (path, role) in files {
+            assert_eq!(tokens.role_of(&of_file(path).unwrap()), Some(role));
+        }
+        assert_eq!(tokens.role_of(""), None);
+        fs::copy(&watch, file("copy")).unwrap();
+        let both = [(&*watch, Role::Watch), (&*file("copy"), Role::Operate)];
+        let why = Tokens::of_files(both).unwrap_err();
+        assert!(why.contains("may watch already"), "{why}");
     }
 
     #[test]

@@ -55,6 +55,7 @@ fn example(word: &str) -> (&str, Value) {
         "subscribe" => json!({ "rate_hz": 0 }),
         "scope" | "capture" => json!({ "signals": ["sigma"] }),
         "lease" => json!({ "how": "take" }),
+        "role" => json!({ "as": "operate" }),
         "jog-stop" => return ("jog", json!({ "stop": true })),
         "load" | "check" => json!({ "text": "M2\n" }),
         "upload" => json!({ "name": "x.ngc", "text": "M2\n" }),

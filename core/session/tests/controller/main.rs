@@ -1,7 +1,10 @@
 //! A controller on the virtual clock: what clients ask by ticks, and what they are told.
 
+mod doors;
 mod every_state;
+mod homing;
 mod page;
+mod queued;
 mod scale;
 mod seeing;
 mod support;

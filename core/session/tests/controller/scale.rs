@@ -6,10 +6,8 @@
 use std::time::Instant;
 
 use serde_json::{Value, json};
-use tandem_host::Clock;
 use tandem_rig::Random;
 use tandem_session::controller::{Controller, NoKeeper, Options, ScriptLine};
-use tandem_session::operator::Listen;
 
 use crate::support::{machine, registry};
 
@@ -31,16 +29,7 @@ fn from_environment(name: &str, default: f64) -> f64 {
 fn drive(name: &str, script: Vec<ScriptLine>) -> (std::collections::BTreeMap<String, u64>, i64) {
     let last = script.last().unwrap().tick;
     let registry = registry();
-    let asked = Options {
-        clock: Clock::Virtual,
-        listen: Listen::default(),
-        programs: None,
-        record: None,
-        enable: true,
-        script,
-        uptime_periods: 0,
-        lasting: None,
-    };
+    let asked = Options::of_script(script);
     let controller =
         Controller::open(&machine(name), &registry, asked, Box::new(NoKeeper)).unwrap();
     let (mut counts, mut at_first, mut now) = (std::collections::BTreeMap::new(), None, 0);

@@ -1,5 +1,9 @@
 //! What clients see: path, scope, captures, what is to go, inputs and outputs; and what they bring.
 
+use std::fmt::Write as _;
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
 use tandem_session::controller::NoKeeper;
 
@@ -71,6 +75,81 @@ fn the_path_is_seen_before_it_is_driven_and_where_the_machine_was_behind_it() {
     assert_eq!(after["driven_count"].as_u64().unwrap(), driven.len() as u64);
     assert_eq!(*driven.last().unwrap(), json!([20.0, -20.0, 0.0]));
     assert!(after["generation"].as_u64() > before["generation"].as_u64());
+}
+
+/// The numbers of a packed answer, `width` to each point.
+fn unpacked(text: &Value, width: usize) -> Vec<Vec<f64>> {
+    let bytes = STANDARD.decode(text.as_str().unwrap()).unwrap();
+    let numbers: Vec<f64> = bytes
+        .chunks_exact(4)
+        .map(|four| f64::from(f32::from_le_bytes(four.try_into().unwrap())))
+        .collect();
+    numbers.chunks_exact(width).map(<[f64]>::to_vec).collect()
+}
+
+#[test]
+fn a_packed_path_is_the_same_path_from_any_point_on_however_long_it_is() {
+    let mut says = Says::new();
+    let mut text = ARC.replace("M2\n", "G0 Z5\n");
+    for n in 0..9000 {
+        let _ = writeln!(text, "G1 X{} Y{}", f64::from(n % 200) / 10.0, n % 7);
+    }
+    text += "M2\n";
+    says.ask(1000, "load", json!({ "text": text, "name": "long.ngc" }));
+    let plain = says.ask(100, "path", json!({}));
+    let all: Vec<_> = (0..4)
+        .map(|part| says.ask(1, "path", json!({ "packed": true, "from": part * 3000 })))
+        .collect();
+    let beyond = says.ask(1, "path", json!({ "packed": true, "from": 1_000_000 }));
+    let told = Told::by(
+        &machine("mill-3axis.toml"),
+        says,
+        |_| (),
+        Box::new(NoKeeper),
+    );
+    let plain = told.ok(plain);
+    let first = told.ok(all[0]);
+    assert!(
+        first.to_string().len() < 128 * 1024,
+        "it fits what may wait"
+    );
+    let drawn = unpacked(&first["points"], 3);
+    let kinds = STANDARD.decode(first["kinds"].as_str().unwrap()).unwrap();
+    assert_eq!(drawn.len(), kinds.len());
+    assert_eq!(kinds[..3], [2, 1, 0], "a start, a rapid, a line at feed");
+    let shown = points(&plain["pieces"]);
+    for (one, other) in drawn[1..].iter().zip(&shown) {
+        let apart = one.iter().zip(other).map(|(a, b)| (a - b).abs());
+        assert!(apart.fold(0.0, f64::max) < 1e-4, "{one:?} {other:?}");
+    }
+    assert!(shown.len() > 100);
+    let count = first["count"].as_u64().unwrap();
+    assert_eq!(first["low"], json!([0.0, -20.0, 0.0]));
+    let high: Vec<f64> = serde_json::from_value(first["high"].clone()).unwrap();
+    assert!(
+        (high[0] - 30.0).abs() < 0.01 && high[1..] == [6.0, 5.0],
+        "{high:?}"
+    );
+    // Parts that overlap have the same points, and together all of them.
+    let mut whole = vec![];
+    for part in all {
+        let told = told.ok(part);
+        let from = told["from"].as_u64().unwrap() as usize;
+        let points = unpacked(&told["points"], 3);
+        for (at, point) in points.into_iter().enumerate() {
+            match whole.get(from + at) {
+                Some(there) => assert_eq!(*there, point),
+                None => whole.push(point),
+            }
+        }
+    }
+    assert_eq!(whole.len() as u64, count);
+    let end = whole.last().unwrap();
+    assert!(
+        (end[0] - 19.9).abs() < 1e-5 && end[1..] == [4.0, 5.0],
+        "{end:?}"
+    );
+    assert_eq!(unpacked(&told.ok(beyond)["points"], 3).len(), 0);
 }
 
 #[test]
@@ -225,4 +304,32 @@ fn keys_of_axes_that_the_machine_lacks_are_refused() {
     );
     assert!(told.why(wrong).contains("\"w_mm\"") && told.why(unit).contains("\"x_deg\""));
     told.ok(set);
+}
+
+/// A bus is there to be seen where there is one: how old what it brings is, in how many periods it was, and its phase.
+#[test]
+fn how_well_the_drives_are_heard_is_seen_where_they_are_on_a_bus() {
+    let bus = |keys: &[(&str, &str)]| {
+        let mut says = Says::new();
+        says.ask(1000, "mdi", json!({ "line": "G1 X10 F3000" }));
+        let late = says.ask(90, "status", json!({}));
+        let after = says.ask(1000, "status", json!({}));
+        let on = crate::support::machine_with("mill-3axis.toml", keys);
+        let told = Told::by(&on, says, |_| (), Box::new(NoKeeper));
+        [late, after].map(|id| told.ok(id)["bus"].clone())
+    };
+    assert_eq!(bus(&[]), [Value::Null, Value::Null]);
+    let clock = (
+        "driver.options.bus_clock",
+        "{drift_ppm = 20, jitter_us = 5}",
+    );
+    let stale = (
+        "faults.wrap",
+        "[{kind = \"drop\", at_call = 1180, periods = 20}]",
+    );
+    let [late, after] = bus(&[clock, stale]);
+    assert!(late["phase_us"].is_number(), "{late}");
+    assert!(late["feedback_age_periods"].as_u64().unwrap() > 0, "{late}");
+    assert_eq!(after["feedback_age_periods"], 0);
+    assert_eq!(after["old_feedback_periods"], 20);
 }

@@ -5,10 +5,9 @@ use std::sync::{Arc, Mutex};
 
 use serde_json::{Value, json};
 use tandem_gcode::Lasting;
-use tandem_host::{Clock, Registry};
+use tandem_host::Registry;
 use tandem_machine::Machine;
 use tandem_session::controller::{Controller, Keeper, Options, ScriptLine};
-use tandem_session::operator::Listen;
 use tandem_state::Change;
 
 pub fn examples() -> PathBuf {
@@ -73,16 +72,7 @@ impl Told {
         keeper: Box<dyn Keeper>,
     ) -> Self {
         let registry = registry();
-        let mut asked = Options {
-            clock: Clock::Virtual,
-            listen: Listen::default(),
-            programs: None,
-            record: None,
-            enable: true,
-            script: says.lines,
-            uptime_periods: 0,
-            lasting: None,
-        };
+        let mut asked = Options::of_script(says.lines);
         options(&mut asked);
         let controller = Controller::open(machine, &registry, asked, keeper).unwrap();
         let mut told = vec![];

@@ -69,6 +69,101 @@ fn what_a_job_writes_is_kept_when_the_path_reaches_it() {
     assert!(!kept.1.lock().unwrap().iter().any(is_written));
 }
 
+/// Stopped in the middle of a line, and long after it: nothing is fed.
+#[test]
+fn behind_an_emergency_stop_the_feed_is_none() {
+    let mut says = Says::new();
+    says.ask(1000, "mdi", json!({ "line": "G1 X40 F1200" }));
+    let moves = says.ask(1000, "status", json!({}));
+    says.ask(1, "emergency-stop", json!({}));
+    let after = [2, 100, 3000].map(|ticks| says.ask(ticks, "status", json!({})));
+    let told = Told::by(
+        &machine("mill-3axis.toml"),
+        says,
+        |_| (),
+        Box::new(NoKeeper),
+    );
+    let feed = |id: u64| told.ok(id)["feed_mm_per_min"].as_f64().unwrap();
+    assert!((feed(moves) - 1200.0).abs() < 1e-6, "{}", feed(moves));
+    assert_eq!(after.map(feed), [0.0; 3]);
+}
+
+#[test]
+fn behind_the_end_of_a_program_what_it_wrote_lasts_and_modes_are_as_at_the_start() {
+    let part = "G20 G91 G18 G55 F20\nM3 S500 M8\nG1 X1\n#500 = 7\nG92 X0\nG10 L2 P2 Y25.4\nM2\n";
+    let mut says = Says::new();
+    says.ask(1000, "set-tool", json!({ "number": 2, "z_mm": 30.0 }));
+    says.ask(10, "load", json!({ "text": part }));
+    says.ask(10, "start", json!({}));
+    let after = says.ask(9000, "status", json!({}));
+    // The parameter and the coordinate system are those of the next line.
+    let line = says.ask(10, "mdi", json!({ "line": "G0 Z[0 - #500]" }));
+    let there = says.ask(3000, "status", json!({}));
+    let told = Told::by(
+        &machine("mill-3axis.toml"),
+        says,
+        |_| (),
+        Box::new(NoKeeper),
+    );
+    let status = told.ok(after);
+    assert_eq!(told.jobs()[0], ("program".to_string(), "done".to_string()));
+    let modal = status["modal"].to_string();
+    for word in ["G17", "G21", "G90", "G94", "G64", "M5"] {
+        assert!(modal.contains(word), "{word}: {modal}");
+    }
+    assert_eq!(
+        (
+            &status["system"],
+            &status["spindle_rpm"],
+            &status["coolant"]
+        ),
+        (&json!("G55"), &json!(0.0), &json!("off"))
+    );
+    assert!(
+        (status["g92"]["x_mm"].as_f64().unwrap() - 25.4).abs() < 1e-9,
+        "{status}"
+    );
+    assert!(
+        (status["work_position"]["x_mm"].as_f64().unwrap()).abs() < 1e-9,
+        "{status}"
+    );
+    told.ok(line);
+    assert_eq!(told.ok(there)["position"]["z_mm"], -7.0);
+}
+
+/// An axis without a brake sinks while its drive has let go: where it stands is asked of the drive.
+#[test]
+fn behind_letting_go_the_drives_say_where_they_stand() {
+    let machine = machine_with(
+        "mill-3axis.toml",
+        &[("driver.options.sag_mm_per_s", "[0, 0, -5]")],
+    );
+    let mut says = Says::new();
+    let line = says.ask(1000, "mdi", json!({ "line": "G0 X10 Z20" }));
+    let before = says.ask(3000, "status", json!({}));
+    says.ask(10, "disable", json!({}));
+    let enable = says.ask(2000, "enable", json!({}));
+    let after = says.ask(2000, "status", json!({}));
+    says.ask(10, "mdi", json!({ "line": "G91 G0 Z1" }));
+    let moved = says.ask(2000, "status", json!({}));
+    let told = Told::by(&machine, says, |_| (), Box::new(NoKeeper));
+    for id in [line, enable] {
+        told.ok(id);
+    }
+    let z = |id: u64| told.ok(id)["position"]["z_mm"].as_f64().unwrap();
+    assert_eq!(
+        (z(before), &told.ok(after)["position"]["x_mm"]),
+        (20.0, &json!(10.0))
+    );
+    assert!(z(after) < 15.0, "{}", z(after));
+    assert!(
+        (z(moved) - z(after) - 1.0).abs() < 1e-9,
+        "{} {}",
+        z(moved),
+        z(after)
+    );
+}
+
 fn open(path: &Path, machine: &Machine) -> Store {
     let store = Store::open(path, Owner::of(machine)).unwrap();
     if store.is_new() {
@@ -285,6 +380,13 @@ fn parameters_of_the_policy_script_are_set_where_it_knows_them_and_last() {
     let last = says.ask(100, "policy-parameters", json!({}));
     let told = Told::by(&machine, says, |_| (), Box::new(kept.clone()));
     assert_eq!(told.ok(first)["parameters"], json!({ name: 20.0 }));
+    let declared = told.ok(first)["declared"].as_array().unwrap();
+    let of = declared.iter().find(|of| of["name"] == name).unwrap();
+    let bound = |key: &str| of[key].as_f64().unwrap();
+    assert!(
+        bound("lowest") <= 20.0 && bound("highest") >= 30.0 && !of["description"].is_null(),
+        "{of}"
+    );
     told.ok(set);
     assert!(
         told.why(unknown).contains("nonsense"),

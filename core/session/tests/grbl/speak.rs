@@ -12,7 +12,6 @@ use tandem_gcode::Program;
 use tandem_host::{Clock, Registry, Run, Switches};
 use tandem_machine::Machine;
 use tandem_session::controller::{Controller, NoKeeper, Options, ScriptLine, VirtualSender};
-use tandem_session::operator::Listen;
 
 pub fn machine(name: &str, sets: &[(&str, &str)]) -> Machine {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines");
@@ -31,30 +30,28 @@ pub fn registry() -> Registry {
     registry
 }
 
-pub fn options(script: Vec<ScriptLine>) -> Options {
-    Options {
-        clock: Clock::Virtual,
-        listen: Listen::default(),
-        programs: None,
-        record: None,
-        enable: true,
-        script,
-        uptime_periods: 0,
-        lasting: None,
-    }
-}
-
 /// Lets senders and a script speak to a machine; what everybody but the senders was told.
 pub fn serve(
     machine: &Machine,
     senders: Vec<Box<dyn VirtualSender>>,
     script: Vec<ScriptLine>,
 ) -> Vec<Value> {
+    serve_recorded(machine, senders, script, None)
+}
+
+/// The same with the files of every job in a folder.
+pub fn serve_recorded(
+    machine: &Machine,
+    senders: Vec<Box<dyn VirtualSender>>,
+    script: Vec<ScriptLine>,
+    record: Option<&Path>,
+) -> Vec<Value> {
     let registry = registry();
-    let mut controller =
-        Controller::open(machine, &registry, options(script), Box::new(NoKeeper)).unwrap();
+    let mut options = Options::of_script(script);
+    options.record = record.map(Path::to_path_buf);
+    let mut controller = Controller::open(machine, &registry, options, Box::new(NoKeeper)).unwrap();
     for sender in senders {
-        controller.attend(sender);
+        controller.add_sender(sender);
     }
     let mut told = vec![];
     controller
@@ -105,6 +102,12 @@ pub fn lines_of(partial: &mut String, heard: &str) -> Vec<String> {
     lines
 }
 
+/// The same; nothing while the machine is being enabled.
+pub fn lines_when_enabled(partial: &mut String, tick: u64, heard: &str) -> Vec<String> {
+    let lines = lines_of(partial, heard);
+    if tick > ENABLED_BY { lines } else { vec![] }
+}
+
 impl VirtualSender for Speaker {
     fn period(&mut self, tick: u64, heard: &str, say: &mut Vec<u8>) -> bool {
         let lines = lines_of(&mut self.partial, heard);
@@ -125,6 +128,50 @@ pub fn words(log: &Log) -> Vec<String> {
         .unwrap()
         .iter()
         .map(|(_, line)| line.clone())
+        .collect()
+}
+
+/// What one sender heard, and what everybody else was told.
+pub struct Heard {
+    /// With the tick of each line.
+    pub log: Vec<(u64, String)>,
+    pub words: Vec<String>,
+    pub told: Vec<Value>,
+}
+
+/// Lets one sender say what it says at its ticks, until `until`, beside the script of another client.
+pub fn speak(
+    machine: &Machine,
+    says: &[(u64, &[u8])],
+    until: u64,
+    script: Vec<ScriptLine>,
+) -> Heard {
+    let (speaker, log) = Speaker::new(says, until);
+    let told = serve(machine, vec![speaker], script);
+    let words = words(&log);
+    let log = log.lock().unwrap().clone();
+    Heard { log, words, told }
+}
+
+/// The lines that begin with `start`.
+pub fn beginning<'a>(words: &'a [String], start: &str) -> Vec<&'a str> {
+    words
+        .iter()
+        .map(String::as_str)
+        .filter(|word| word.starts_with(start))
+        .collect()
+}
+
+/// The states that the reports told.
+pub fn states(words: &[String]) -> Vec<&str> {
+    beginning(words, "<").into_iter().map(state).collect()
+}
+
+/// When this line was heard.
+pub fn ticks_of(log: &[(u64, String)], line: &str) -> Vec<u64> {
+    log.iter()
+        .filter(|(_, heard)| heard == line)
+        .map(|(tick, _)| *tick)
         .collect()
 }
 
@@ -149,6 +196,8 @@ pub struct Streamer {
     /// Bytes of each line that is on the way.
     pub on_the_way: VecDeque<usize>,
     pub budget: usize,
+    /// Ticks from one look at what may be sent to the next: what a cable and a program in between take.
+    pub every: u64,
     /// Ticks for which nothing is sent, once so many lines are.
     pub stall: Option<(usize, u64)>,
     pub stalled_until: u64,
@@ -165,6 +214,7 @@ pub struct Seen {
     pub answers: usize,
     pub errors: Vec<String>,
     pub reports: usize,
+    pub last_report: String,
     pub first_motion: Option<u64>,
     pub end: u64,
     pub lies: Vec<String>,
@@ -182,6 +232,7 @@ impl Streamer {
             lines: text.lines().map(|line| format!("{line}\n")).collect(),
             on_the_way: VecDeque::new(),
             budget,
+            every: 1,
             stall: None,
             stalled_until: ENABLED_BY,
             sent: 0,
@@ -204,6 +255,7 @@ impl Streamer {
             self.on_the_way.pop_front();
         } else if line.starts_with('<') {
             seen.reports += 1;
+            seen.last_report = line.to_string();
             if state(line) == "Run" {
                 seen.first_motion.get_or_insert(tick);
             }
@@ -217,6 +269,7 @@ impl Streamer {
                 .unwrap();
             if let Some(on_the_way) = self.polled.take()
                 && free + on_the_way != 1024
+                && seen.lies.len() < 3
             {
                 seen.lies
                     .push(format!("{line} with {on_the_way} bytes on the way"));
@@ -238,6 +291,7 @@ impl VirtualSender for Streamer {
             }
         }
         while tick >= self.stalled_until
+            && tick.is_multiple_of(self.every)
             && let Some(line) = self.lines.front()
             && self.on_the_way.iter().sum::<usize>() + line.len() <= self.budget
         {

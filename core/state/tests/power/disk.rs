@@ -36,7 +36,7 @@ struct Inside {
     /// Deleted without the folder being synced: they may come back.
     deleted: Vec<(String, File)>,
     operations_left: Option<u64>,
-    most_bytes: Option<usize>,
+    max_bytes: Option<usize>,
     read_only: bool,
     cut: bool,
 }
@@ -167,7 +167,7 @@ impl Disk {
     }
 
     pub fn hold_at_most(&self, bytes: usize) {
-        lock(&self.inside).most_bytes = Some(bytes);
+        lock(&self.inside).max_bytes = Some(bytes);
     }
 
     pub fn read_only(&self) {
@@ -382,7 +382,7 @@ unsafe extern "C" fn write(
             let bytes = std::slice::from_raw_parts(bytes.cast::<u8>(), count as usize);
             let from = from as usize;
             let total = inside.bytes();
-            let most = inside.most_bytes.unwrap_or(usize::MAX);
+            let most = inside.max_bytes.unwrap_or(usize::MAX);
             let file = inside.files.entry(name.to_owned()).or_default();
             let grows = (from + bytes.len()).saturating_sub(file.now.len());
             if total.saturating_add(grows) > most {

@@ -85,10 +85,28 @@ impl Clock {
 
     /// Local time, and the part of a ns behind it in 10⁻⁹ ns.
     fn local_exactly(&self, at_ns: u64) -> (u64, i64) {
-        let elapsed = i128::from(at_ns.saturating_sub(self.base_ns));
-        let parts = elapsed * i128::from(self.speed_ppb()) + i128::from(self.base_fraction);
-        let local = i128::from(self.base_local) + elapsed + parts.div_euclid(1_000_000_000);
-        (local as u64, parts.rem_euclid(1_000_000_000) as i64)
+        let elapsed = at_ns.saturating_sub(self.base_ns);
+        // Behind a change of speed 64 bits are enough for hours; divisions of 128 would take most of a bus's time.
+        let short = i64::try_from(elapsed)
+            .ok()
+            .and_then(|elapsed| elapsed.checked_mul(self.speed_ppb()))
+            .and_then(|parts| parts.checked_add(self.base_fraction));
+        let (whole, fraction) = short.map_or_else(
+            || {
+                let parts = i128::from(elapsed) * i128::from(self.speed_ppb())
+                    + i128::from(self.base_fraction);
+                let whole = parts.div_euclid(1_000_000_000) as i64;
+                (whole, parts.rem_euclid(1_000_000_000) as i64)
+            },
+            |parts| {
+                (
+                    parts.div_euclid(1_000_000_000),
+                    parts.rem_euclid(1_000_000_000),
+                )
+            },
+        );
+        let local = self.base_local.wrapping_add(elapsed);
+        (local.wrapping_add_signed(whole), fraction)
     }
 
     pub(crate) fn local(&self, at_ns: u64) -> u64 {

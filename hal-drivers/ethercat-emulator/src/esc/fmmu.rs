@@ -24,6 +24,13 @@ pub(crate) struct Overlap {
     pub(crate) bits: usize,
 }
 
+impl Overlap {
+    /// Whether it begins and ends with whole bytes on both sides.
+    pub(crate) fn is_of_bytes(&self) -> bool {
+        (self.data_bit | self.physical_bit | self.bits).is_multiple_of(8)
+    }
+}
+
 impl Fmmu {
     /// Reads the registers of a unit.
     pub(crate) fn of(registers: &[u8]) -> Self {
@@ -44,6 +51,11 @@ impl Fmmu {
             reads: registers[11] & 1 == 1,
             writes: registers[11] & 2 == 2,
         }
+    }
+
+    /// Whether it maps anything.
+    pub(crate) fn is_active(&self) -> bool {
+        self.start_bit < self.end_bit
     }
 
     /// What a datagram of `length` bytes at logical address `address` shares with this unit.

@@ -12,7 +12,7 @@ pub(crate) use eeprom::Eeprom;
 
 use crate::bytes::{copy_bits, put, u16_at, u32_at};
 use clock::Clock;
-use fmmu::Fmmu;
+use fmmu::{Fmmu, Overlap};
 use registers as at;
 use sync_manager::{Access, Direction, SyncManager};
 
@@ -26,7 +26,9 @@ pub(crate) const MAX_UNITS: usize = 16;
 pub(crate) struct Esc {
     memory: Vec<u8>,
     extent: at::Extent,
+    /// Those that map anything, in their order.
     fmmus: [Fmmu; MAX_UNITS],
+    active_fmmus: usize,
     pub(crate) sync_managers: [SyncManager; MAX_UNITS],
     pub(crate) clock: Clock,
     pub(crate) eeprom: Eeprom,
@@ -90,6 +92,7 @@ impl Esc {
             memory: vec![0; MEMORY],
             extent,
             fmmus: [Fmmu::default(); MAX_UNITS],
+            active_fmmus: 0,
             sync_managers: [SyncManager::default(); MAX_UNITS],
             clock,
             eeprom,
@@ -211,7 +214,10 @@ impl Esc {
     /// Asks all sync managers for an access, and lets it happen where none refuses.
     fn pass_sync_managers(&mut self, at_ns: u64, start: usize, end: usize, writes: bool) -> bool {
         let mut verdicts = [Access::Beside; MAX_UNITS];
-        for (verdict, manager) in verdicts.iter_mut().zip(&self.sync_managers) {
+        for (verdict, manager) in verdicts
+            .iter_mut()
+            .zip(&self.sync_managers[..self.extent.sync_managers])
+        {
             *verdict = manager.judge(start, end, writes);
         }
         if verdicts.contains(&Access::Refused) {
@@ -249,55 +255,62 @@ impl Esc {
         writes: bool,
     ) -> (bool, bool) {
         let (mut read, mut written) = (false, false);
-        let units = &self.fmmus[..self.extent.fmmus];
-        let meant = |unit: &Fmmu| {
-            (unit.reads && reads || unit.writes && writes)
-                && unit.overlap(address, data.len()).is_some()
-        };
-        if !units.iter().any(meant) {
-            // Most datagrams of a frame are another device's.
-            return (false, false);
-        }
-        let mut buffer = [0; crate::frame::MAX_DATA];
         // What is written is taken before what is read lies over it: both may be the same logical bytes.
-        for unit in self.fmmus {
-            let Some(part) = unit
-                .overlap(address, data.len())
-                .filter(|_| unit.writes && writes)
-            else {
-                continue;
-            };
-            let start = part.physical_bit / 8;
-            let end = (part.physical_bit + part.bits).div_ceil(8).min(MEMORY);
-            if start >= end {
-                continue;
+        for index in 0..self.active_fmmus {
+            let unit = self.fmmus[index];
+            if unit.writes
+                && writes
+                && let Some(part) = unit.overlap(address, data.len())
+            {
+                written |= self.take(at_ns, part, data);
             }
-            let bytes = &mut buffer[..end - start];
-            bytes.copy_from_slice(&self.memory[start..end]);
-            copy_bits(data, part.data_bit, bytes, part.physical_bit % 8, part.bits);
-            written |= self.write(at_ns, start, &buffer[..end - start]);
         }
-        for unit in self.fmmus {
-            let Some(part) = unit
-                .overlap(address, data.len())
-                .filter(|_| unit.reads && reads)
-            else {
-                continue;
-            };
-            let start = part.physical_bit / 8;
-            let end = (part.physical_bit + part.bits).div_ceil(8).min(MEMORY);
-            if start < end && self.read(at_ns, start, &mut buffer[..end - start]) {
-                copy_bits(
-                    &buffer[..end - start],
-                    part.physical_bit % 8,
-                    data,
-                    part.data_bit,
-                    part.bits,
-                );
-                read = true;
+        for index in 0..self.active_fmmus {
+            let unit = self.fmmus[index];
+            if unit.reads
+                && reads
+                && let Some(part) = unit.overlap(address, data.len())
+            {
+                read |= self.give(at_ns, part, data);
             }
         }
         (read, written)
+    }
+
+    /// Writes the part of a datagram that a unit maps into the memory; whether it was granted.
+    fn take(&mut self, at_ns: u64, part: Overlap, data: &[u8]) -> bool {
+        let start = part.physical_bit / 8;
+        let end = (part.physical_bit + part.bits).div_ceil(8).min(MEMORY);
+        if start >= end {
+            return false;
+        }
+        if part.is_of_bytes() {
+            return self.write(at_ns, start, &data[part.data_bit / 8..][..end - start]);
+        }
+        let mut buffer = [0; crate::frame::MAX_DATA];
+        let bytes = &mut buffer[..end - start];
+        bytes.copy_from_slice(&self.memory[start..end]);
+        copy_bits(data, part.data_bit, bytes, part.physical_bit % 8, part.bits);
+        self.write(at_ns, start, bytes)
+    }
+
+    /// Reads the part of a datagram that a unit maps out of the memory; whether it was granted.
+    fn give(&mut self, at_ns: u64, part: Overlap, data: &mut [u8]) -> bool {
+        let start = part.physical_bit / 8;
+        let end = (part.physical_bit + part.bits).div_ceil(8).min(MEMORY);
+        if start >= end {
+            return false;
+        }
+        if part.is_of_bytes() {
+            return self.read(at_ns, start, &mut data[part.data_bit / 8..][..end - start]);
+        }
+        let mut buffer = [0; crate::frame::MAX_DATA];
+        let bytes = &mut buffer[..end - start];
+        let granted = self.read(at_ns, start, bytes);
+        if granted {
+            copy_bits(bytes, part.physical_bit % 8, data, part.data_bit, part.bits);
+        }
+        granted
     }
 
     /// The time of the process data watchdog, in ns; none where it is off.
@@ -356,8 +369,13 @@ impl Esc {
     }
 
     fn load_units(&mut self) {
+        self.active_fmmus = 0;
         for index in 0..self.extent.fmmus {
-            self.fmmus[index] = Fmmu::of(&self.memory[at::FMMU + 16 * index..][..16]);
+            let unit = Fmmu::of(&self.memory[at::FMMU + 16 * index..][..16]);
+            if unit.is_active() {
+                self.fmmus[self.active_fmmus] = unit;
+                self.active_fmmus += 1;
+            }
         }
     }
 

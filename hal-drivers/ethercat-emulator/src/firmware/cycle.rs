@@ -13,6 +13,8 @@ const TO_DEVICE: usize = 0;
 const TO_MASTER: usize = 1;
 /// Bytes of a mailbox header.
 const MAIL_HEADER: usize = 6;
+/// Cycles without a SYNC0 after which a drive takes it for lost, though frames come.
+const MAX_CYCLES_WITHOUT_SYNC: u64 = 5;
 
 /// Outputs and sync pulses since SAFE-OPERATIONAL.
 #[derive(Clone, Copy, Debug, Default)]
@@ -22,6 +24,9 @@ pub(crate) struct SyncWatch {
     /// Outputs came since the last pulse.
     fresh: bool,
     errors: u64,
+    /// Pulses that the firmware's loop has seen, and when it last saw another one.
+    seen: u64,
+    seen_ns: u64,
 }
 
 impl Device {
@@ -130,6 +135,7 @@ impl Device {
         self.pursue_change(at_ns);
         self.pursue_mail(at_ns);
         self.watch(at_ns);
+        self.watch_sync(at_ns);
         let led = self.firmware.state == AlState::Op;
         let firmware = &mut self.firmware;
         if let Some(drive) = &mut firmware.drive {
@@ -152,6 +158,22 @@ impl Device {
             self.clear_outputs();
         } else {
             self.fall(AlState::SafeOp, AlCode::WATCHDOG);
+        }
+    }
+
+    /// SYNC0 that stays away: its own loop notices, whatever frames come.
+    fn watch_sync(&mut self, at_ns: u64) {
+        let in_operation = self.firmware.state == AlState::Op && self.is_synchronous();
+        let watch = &mut self.firmware.sync;
+        if !in_operation || watch.pulses != watch.seen {
+            (watch.seen, watch.seen_ns) = (watch.pulses, at_ns);
+            return;
+        }
+        let cycle_ns = self.esc.clock.sync_cycle_ns().map_or(0, u64::from);
+        let max_ns = cycle_ns * MAX_CYCLES_WITHOUT_SYNC;
+        if watch.pulses > 0 && cycle_ns > 0 && at_ns - watch.seen_ns > max_ns {
+            watch.seen_ns = at_ns;
+            self.fall(AlState::SafeOp, AlCode::FATAL_SYNC_ERROR);
         }
     }
 
@@ -228,6 +250,11 @@ impl Device {
             refusals: &self.firmware.trouble.sdos,
             is_drive: self.firmware.drive.is_some(),
         };
+        let (left, code) = &mut self.firmware.trouble.emergencies;
+        if *left > 0 {
+            *left -= 1;
+            mailbox.emergency(*code, 1);
+        }
         mailbox.take(&message, &mut context);
         self.post();
     }

@@ -47,6 +47,8 @@ pub(crate) struct Trouble {
     pub(crate) sdos: Vec<SdoRefusal>,
     /// Its mailbox takes messages and answers none.
     pub(crate) silent: bool,
+    /// So many of its next answers have an emergency message before them, with this code.
+    pub(crate) emergencies: (u32, u16),
     /// It does not see process data.
     pub(crate) deaf: bool,
 }

@@ -1,8 +1,8 @@
 //! What goes wrong: each fault at its frame, for its time, and nothing besides.
 
 use tandem_ethercat_emulator::{
-    AlCode, AlState, BusDescription, DeviceDescription, Fault, Kind, MAX_FRAME, Span, What, When,
-    Wire,
+    AlCode, AlState, BusDescription, BusFault, DeviceDescription, Kind, MAX_FRAME, Span, What,
+    When, Wire,
 };
 
 /// A frame with one datagram.
@@ -56,7 +56,7 @@ fn sent(wire: &mut Wire, frames: u8) -> Vec<(u64, Vec<u8>)> {
 /// The numbers of EtherCAT frames in the order in which they come back, where the third of six is faulty.
 fn numbers(what: What) -> (Vec<u8>, Vec<(u64, Vec<u8>)>) {
     let mut wire = Wire::new(&three_drives()).unwrap();
-    wire.add(Fault {
+    wire.add(BusFault {
         at: When::Frame(3),
         lasts: None,
         what,
@@ -109,7 +109,7 @@ fn faults_of_frames_meet_one_frame() {
 fn a_lost_request_is_not_done_and_a_lost_reply_is() {
     for (what, done) in [(What::LostRequest, false), (What::LostReply, true)] {
         let mut wire = Wire::new(&three_drives()).unwrap();
-        wire.add(Fault {
+        wire.add(BusFault {
             at: When::Frame(1),
             lasts: None,
             what,
@@ -132,7 +132,7 @@ fn a_cut_cable_ends_the_bus_there_until_it_is_plugged_again() {
         (Some(2), Some(3)),
     ] {
         let mut wire = Wire::new(&three_drives()).unwrap();
-        wire.add(Fault {
+        wire.add(BusFault {
             at: When::Frame(2),
             lasts: Some(Span::Ms(2.5)),
             what: What::Cut { behind },
@@ -159,7 +159,7 @@ fn a_device_that_is_deaf_lacks_in_the_working_counter() {
         ..BusDescription::default()
     })
     .unwrap();
-    wire.add(Fault {
+    wire.add(BusFault {
         at: When::Cycle(2),
         lasts: Some(Span::Cycles(2)),
         what: What::Deaf { device: 1 },
@@ -235,6 +235,7 @@ fn every_fault_can_be_written_in_a_file_and_happens_to_the_device_that_it_names(
         "kind = \"hang-state\", device = 1, state = \"pre-op\"",
         "kind = \"sdo-abort\", device = 1, index = 0x1C12, abort = 0x08000021",
         "kind = \"silent-mailbox\", device = 1",
+        "kind = \"emergencies\", device = 1, messages = 2, code = 0x6100",
         "kind = \"drive-fault\", device = 1, code = 0x7210, stays = true",
         "kind = \"never-enables\", device = 1",
         "kind = \"disables-itself\", device = 1",
@@ -277,7 +278,7 @@ fn an_error_of_a_device_begins_at_its_time_and_not_before() {
         state: AlState::SafeOp,
         code: AlCode::FATAL_SYNC_ERROR,
     };
-    wire.add(Fault {
+    wire.add(BusFault {
         at: When::Ms(3.25),
         lasts: None,
         what,

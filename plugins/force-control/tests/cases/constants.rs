@@ -63,6 +63,8 @@ fn published_loop() -> LoopModel {
         mean_samples: 8.0,
         tooth_period_s: TOOTH_S,
         latency: 1,
+        delay_periods: 0,
+        led: false,
     }
 }
 
@@ -256,4 +258,21 @@ fn the_guard_on_a_sharp_jump() {
             );
         }
     }
+}
+
+#[test]
+fn each_period_that_the_bus_is_late_costs_gain() {
+    let margin = |delay_periods: usize| {
+        let model = LoopModel {
+            delay_periods,
+            ..published_loop()
+        };
+        model.gain_margin(proportional(1000.0), torque_per_feed(4.5), 0.1, 16.0)
+    };
+    let margins = [0, 2, 6, 15].map(margin);
+    println!("{margins:?}");
+    assert!(
+        margins.windows(2).all(|pair| pair[1] < 0.98 * pair[0]),
+        "{margins:?}"
+    );
 }

@@ -93,16 +93,16 @@ pub fn cutting(workpiece: &str) -> Cutting {
 /// Ten plant steps from `t_s` on, under a cut whose force ripples at 30 Hz. Gives the cutting torque at
 /// the last of them, and the highest, N·m.
 pub fn plant(axis: &mut ServoAxis, cutting: &mut Cutting, ripple: f64, t_s: f64) -> (f64, f64) {
-    let (mut load_nm, mut most_nm) = (0.0, 0.0_f64);
+    let (mut load_nm, mut max_nm) = (0.0, 0.0_f64);
     for step in 0..10 {
         let factor = 1.0 + ripple * (TAU * 30.0 * (t_s + f64::from(step) * PLANT_STEP_S)).sin();
         let position = [axis.angle_rad / TURNS, 0.0, 0.0];
         let force_n = cutting.step(position, [1.0, 0.0, 0.0], TAU / 2.0 / TOOTH_S, PLANT_STEP_S);
         load_nm = factor * force_n * axis.torque_per_force_m();
-        most_nm = most_nm.max(load_nm);
+        max_nm = max_nm.max(load_nm);
         axis.step(load_nm, PLANT_STEP_S);
     }
-    (load_nm, most_nm)
+    (load_nm, max_nm)
 }
 
 /// What a force-controlled run is made of.
@@ -127,7 +127,7 @@ pub struct Tick {
     pub s_mm: f64,
     pub torque_nm: f64,
     /// The highest within the tick.
-    pub most_nm: f64,
+    pub max_nm: f64,
     pub feed_mm_per_min: f64,
 }
 
@@ -220,12 +220,12 @@ impl Setup {
             let estimate_nm = self.observer.step(speed, current_a - friction_a);
             mean.push(estimate_nm);
             axis.control(command_mm * TURNS, feed * TURNS);
-            let (torque_nm, most_nm) = plant(&mut axis, &mut cutting, self.ripple, t_s);
+            let (torque_nm, max_nm) = plant(&mut axis, &mut cutting, self.ripple, t_s);
             ran.ticks.push(Tick {
                 t_s,
                 s_mm,
                 torque_nm,
-                most_nm,
+                max_nm,
                 feed_mm_per_min: feed * 60.0,
             });
         }
@@ -257,7 +257,7 @@ impl Ran {
     pub fn peak_nm(&self) -> f64 {
         self.ticks
             .iter()
-            .fold(0.0, |most, tick| most.max(tick.most_nm))
+            .fold(0.0, |most, tick| most.max(tick.max_nm))
     }
 }
 

@@ -143,7 +143,7 @@ fn spot(
     let step_mm = (0.15 / bend)
         .min(route.smooth_for_mm(at_mm, cursor))
         .clamp(2e-3, 0.3);
-    let most_mm = if leg.course.is_straight() {
+    let max_mm = if leg.course.is_straight() {
         STEP_S * cap
     } else {
         f64::INFINITY
@@ -154,7 +154,7 @@ fn spot(
             acceleration_mm_per_s2: leg.least.acceleration_mm_per_s2,
             jerk_mm_per_s3: leg.least.jerk_mm_per_s3,
         },
-        step_mm: step_mm.min(most_mm),
+        step_mm: step_mm.min(max_mm),
         knot_mm,
     }
 }

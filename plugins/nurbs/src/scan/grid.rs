@@ -1,7 +1,8 @@
 //! The motion at the places of the grid, and between them where the path turns much or its third derivative jumps.
 
 use tandem_motion::nurbs::AlongPath;
-use tandem_motion::retime::{Between, PLACES, Point};
+use tandem_motion::retime::{Between, GRID, PLACES, Point};
+use tandem_sdk::MAX_AXES;
 
 use super::motion::Rated;
 use super::spline::evaluate;
@@ -30,7 +31,7 @@ const YIELDED: [f64; 3] = [1.0008, 1.006, 1.02];
 
 /// What a place had when the grid was laid.
 #[derive(Clone, Copy, Debug, Default)]
-struct Place {
+struct PlaceBounds {
     s_mm: f64,
     /// Bound on the rate squared without slowdowns.
     most: f64,
@@ -45,10 +46,10 @@ struct Place {
 /// The places; keeps its memory.
 #[derive(Debug, Default)]
 pub struct Grid {
-    pub points: Vec<[Point; PLACES]>,
+    pub points: Vec<[Point<MAX_AXES>; PLACES]>,
     pub between: Vec<Between>,
-    places: Vec<[Place; PLACES]>,
-    more: Vec<[Place; PLACES]>,
+    places: Vec<[PlaceBounds; PLACES]>,
+    more: Vec<[PlaceBounds; PLACES]>,
 }
 
 impl Grid {
@@ -69,10 +70,9 @@ impl Grid {
         // The end of an interval is the start of the next, but for the third derivative of the motion.
         let mut start: Option<(f64, AlongPath)> = None;
         for k in 0..intervals {
-            let states =
-                [0.0, 0.5, 1.0].map(|z| evaluate(&motion.coefficients, k, z, motion.step_s));
+            let states = GRID.map(|z| evaluate(&motion.coefficients, k, z, motion.step_s));
             let mut turn = 0.0;
-            let mut laid = [(Point::default(), Place::default()); PLACES];
+            let mut laid = [(Point::default(), PlaceBounds::default()); PLACES];
             for (n, state) in states.iter().enumerate() {
                 let at = match start {
                     Some((s_mm, at)) if n == 0 && s_mm == state[0] => at,
@@ -257,7 +257,7 @@ fn place(
     slowdowns: &Slowdowns,
     ([s_mm, s1, s2, s3], cap): (&[f64; 4], f64),
     at: &AlongPath,
-) -> (Point, Place) {
+) -> (Point<MAX_AXES>, PlaceBounds) {
     let [speed, jerk_share] = slowdowns.at(*s_mm);
     let mut point = Point {
         jerk_share,
@@ -279,7 +279,7 @@ fn place(
     point.most = speed * speed * most;
     (
         point,
-        Place {
+        PlaceBounds {
             s_mm: *s_mm,
             most,
             speed,

@@ -1,6 +1,7 @@
 //! Planning one window.
 
-use tandem_motion::retime::{End, LaneLimits, MAX_LANES, Retimer, Task};
+use tandem_motion::retime::{AnyRetimer, AxisLimits, End, Task};
+use tandem_sdk::MAX_AXES;
 
 use super::first::First;
 use super::grid::Grid;
@@ -14,6 +15,8 @@ use crate::windowed::{Ramps, Windowed};
 
 /// Share of the jerk limits that is used.
 const JERK_SHARE: f64 = 0.975;
+/// Share of the acceleration limits that is used: between the places asked for it changes a little.
+const ACCELERATION_SHARE: f64 = 0.99;
 /// Tries.
 const TRIES: usize = 8;
 /// Tries after which limits of samples are to be kept, or never will.
@@ -34,7 +37,7 @@ pub struct Scan {
     first: First,
     /// Time of the first timing of a window without slowdowns, s.
     begun_s: f64,
-    retimer: Retimer,
+    retimer: AnyRetimer,
     grid: Grid,
     slowdowns: Slowdowns,
     /// For paths on which no rate is found.
@@ -160,8 +163,7 @@ impl Scan {
         let task = Task {
             points: &self.grid.points,
             between: &self.grid.between,
-            limits: lanes(job.bounds),
-            jerk_share: JERK_SHARE,
+            limits: limits(job.bounds),
             step_s: motion.step_s,
             ends: (begin, End::Rest),
         };
@@ -214,14 +216,15 @@ fn grid_s(bounds: &Bounds) -> f64 {
     (build_up_s / 4.0).clamp(period_s, (3.0 * period_s).max(MAX_GRID_S))
 }
 
-fn lanes(bounds: &Bounds) -> LaneLimits {
+/// The limits as far as the grid uses them.
+fn limits(bounds: &Bounds) -> AxisLimits {
     let axes = bounds.context.limits.axes();
-    let all = |of: fn(&tandem_sdk::AxisLimits) -> f64| -> [f64; MAX_LANES] {
+    let all = |of: &dyn Fn(&tandem_sdk::AxisLimits) -> f64| -> [f64; MAX_AXES] {
         std::array::from_fn(|i| axes.get(i).map_or(f64::INFINITY, of))
     };
-    LaneLimits {
-        lanes: axes.len(),
-        acceleration: all(|a| a.acceleration_mm_per_s2),
-        jerk: all(|a| a.jerk_mm_per_s3),
+    AxisLimits {
+        count: axes.len(),
+        acceleration_mm_per_s2: all(&|a| ACCELERATION_SHARE * a.acceleration_mm_per_s2),
+        jerk_mm_per_s3: all(&|a| JERK_SHARE * a.jerk_mm_per_s3),
     }
 }

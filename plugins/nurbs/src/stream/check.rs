@@ -107,7 +107,7 @@ pub fn check<M: Motion, N>(
     window.bounds.clear();
     window.first_tick_s = start.first_tick_s;
     window.reserves.clear();
-    window.most_mm_per_s = 0.0;
+    window.max_mm_per_s = 0.0;
     let period_s = bounds.context.fine_period_s;
     let duration_s = window.duration_s();
     let known = slowdowns.count();
@@ -281,7 +281,7 @@ fn judge_last(
 
 /// What a sample leaves for a stop.
 fn note_reserve<M>(window: &mut Window<M>, bounds: &Bounds, at: &AlongPath, speed: f64) {
-    window.most_mm_per_s = window.most_mm_per_s.max(speed);
+    window.max_mm_per_s = window.max_mm_per_s.max(speed);
     let mut reserve = Reserve {
         stop_mm_per_s2: f64::INFINITY,
         stop_mm_per_s3: f64::INFINITY,

@@ -122,7 +122,7 @@ pub fn draw<M: Motion>(
         };
     }
     let jerk_mm_per_s3 = route.front().least.jerk_mm_per_s3;
-    let least_s = least_s(bounds, pen.at);
+    let min_s = min_s(bounds, pen.at);
     for _ in 0..MAX_HALVINGS {
         fill(
             route,
@@ -132,7 +132,7 @@ pub fn draw<M: Motion>(
             segment,
             hermite,
         );
-        if until_s - from_s < 2.0 * least_s
+        if until_s - from_s < 2.0 * min_s
             || follows(route, &mut cursor, jerk_mm_per_s3, segment) && stays(bounds, segment, true)
         {
             break;
@@ -148,7 +148,7 @@ pub fn draw<M: Motion>(
 
 /// The shortest segment through both its ends whose jerk is not that of rounding of positions, s: in a sharp turn the path asks
 /// for it. A quintic whose ends are off by e has 60·e/T³ of that.
-fn least_s(bounds: &Bounds, at: &AxisVector) -> f64 {
+fn min_s(bounds: &Bounds, at: &AxisVector) -> f64 {
     let lanes = bounds.context.limits.axes().iter().zip(at.0);
     let noise = lanes
         .map(|(limits, x)| 60.0 * f64::EPSILON * x.abs().max(1.0) / limits.jerk_mm_per_s3)
@@ -261,10 +261,10 @@ fn stays(bounds: &Bounds, segment: &Segment, meets_ends: bool) -> bool {
 /// A quintic that is off by e in its middle has a third derivative that is off by 384·e/T³ at its ends.
 fn follows(route: &Route, cursor: &mut Cursor, jerk_mm_per_s3: f64, segment: &Segment) -> bool {
     let of_jerk_mm = JERK_OFF * jerk_mm_per_s3 * segment.duration_s.powi(3) / 384.0;
-    let most_mm = OFF_MM.min(of_jerk_mm.max(MIN_OFF_MM));
+    let max_mm = OFF_MM.min(of_jerk_mm.max(MIN_OFF_MM));
     [0.25, 0.5, 0.75].iter().all(|share| {
         let t_s = share * segment.duration_s;
         let off = route.at(segment.path_mm(t_s), cursor).0.position - segment.position(t_s);
-        off.0.iter().all(|off| off.abs() <= most_mm)
+        off.0.iter().all(|off| off.abs() <= max_mm)
     })
 }

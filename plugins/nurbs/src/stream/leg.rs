@@ -263,7 +263,7 @@ impl Least {
             let share = if joint {
                 along.iter().copied().fold(1.0, f64::max)
             } else {
-                least_of(&along).max(1.0)
+                minimum(&along).max(1.0)
             };
             least = [
                 least[0].min(limits.acceleration_mm_per_s2 / share),
@@ -278,6 +278,6 @@ impl Least {
     }
 }
 
-fn least_of(numbers: &[f64]) -> f64 {
+fn minimum(numbers: &[f64]) -> f64 {
     numbers.iter().copied().fold(f64::INFINITY, f64::min)
 }

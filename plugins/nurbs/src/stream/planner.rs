@@ -20,6 +20,8 @@ const STOP_JERK: f64 = 0.5;
 const STOPS: f64 = 1.5;
 /// A window shorter than this that ends where the known path ends is driven to its end, s.
 const SHORT_S: f64 = 0.15;
+/// How often the way from rest to rest is halved where no motion is found on it.
+const SHORTER: usize = 32;
 
 /// A form with windows. Rough loop: blocks allocate when they are accepted, windows where one is longer than any before.
 #[derive(Debug)]
@@ -146,7 +148,7 @@ impl<P: Planning> Windows for PathAhead<P> {
             history: [self.position; 3],
             first_tick_s,
         };
-        let (end_mm, closed) = self.queue.run_end(finished);
+        let (run_end_mm, closed) = self.queue.run_end(finished);
         self.at = self.position;
         self.recent.clear();
         let mut rest = Segment::rest(&self.position, 3.0 * first_tick_s);
@@ -156,18 +158,25 @@ impl<P: Planning> Windows for PathAhead<P> {
             segments: &self.recent,
             at: self.at,
         };
-        let job = Job {
-            route: &route,
-            bounds: &self.bounds,
-            start,
-            driven,
-            end_mm,
-            before: None,
-        };
-        if !self.planning.plan(&job, &mut self.window) {
-            return Err(self.no_way());
+        let mut end_mm = run_end_mm;
+        for _ in 0..SHORTER {
+            let job = Job {
+                route: &route,
+                bounds: &self.bounds,
+                start,
+                driven,
+                end_mm,
+                before: None,
+            };
+            if self.planning.plan(&job, &mut self.window) {
+                return Ok(self.commit_s(closed && end_mm == run_end_mm));
+            }
+            // What no try keeps on the whole way may lie anywhere on it: a shorter way to a rest has less of it.
+            let tried_mm = self.window.motion.end_mm();
+            let is_shorter = tried_mm > self.at_mm && tried_mm < end_mm;
+            end_mm = f64::midpoint(self.at_mm, if is_shorter { tried_mm } else { end_mm });
         }
-        Ok(self.commit_s(closed))
+        Err(self.no_way())
     }
 
     /// The next window, from the state in motion; where none keeps the limits, this one to its end.
@@ -310,7 +319,7 @@ impl<P: Planning> PathAhead<P> {
         let stop_s = self
             .queue
             .route()
-            .map_or(0.0, |route| stop_s(&route, window.most_mm_per_s));
+            .map_or(0.0, |route| stop_s(&route, window.max_mm_per_s));
         let latest_s = whole_s - STOPS * stop_s;
         window
             .motion
@@ -393,7 +402,7 @@ impl<P: Planning> PathAhead<P> {
         let end = window.at(until_s);
         let beyond_mm = (end_mm - end.s_mm).max(0.0);
         // The way to the rest at the end of the window is not how it will be driven.
-        let time_s = until_s - from_s + beyond_mm / window.most_mm_per_s.max(peak);
+        let time_s = until_s - from_s + beyond_mm / window.max_mm_per_s.max(peak);
         let limited_by = match window.bound((from_s, until_s), self.bounds.context.fine_period_s) {
             Some(LimitedBy::Feed) => limited_by_feed(&leg.block),
             bound => bound.unwrap_or(LimitedBy::Jerk),

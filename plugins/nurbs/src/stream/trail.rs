@@ -100,7 +100,7 @@ impl Trail {
             rapid,
             rests,
         });
-        let most_s = PERIODS as f64 * bounds.context.fine_period_s;
+        let max_s = PERIODS as f64 * bounds.context.fine_period_s;
         let mut behind_s: f64 = self
             .spans
             .iter()
@@ -109,7 +109,7 @@ impl Trail {
             .map(|span| span.duration_s)
             .sum();
         while let Some(first) = self.spans.front()
-            && behind_s - first.duration_s >= most_s
+            && behind_s - first.duration_s >= max_s
         {
             behind_s -= first.duration_s;
             self.spans.pop_front();

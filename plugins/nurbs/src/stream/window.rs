@@ -46,7 +46,7 @@ pub struct Window<M> {
     /// What is left for a stop at the ticks from that one on.
     pub reserves: Vec<Reserve>,
     /// Its highest speed.
-    pub most_mm_per_s: f64,
+    pub max_mm_per_s: f64,
     /// Memory of its check.
     pub trail: Trail,
 }
@@ -60,7 +60,7 @@ impl<M: Motion> Window<M> {
         std::mem::swap(&mut self.reserves, &mut other.reserves);
         self.whole = other.whole;
         self.first_tick_s = other.first_tick_s;
-        self.most_mm_per_s = other.most_mm_per_s;
+        self.max_mm_per_s = other.max_mm_per_s;
     }
 
     /// What is left everywhere between two times: the least of the ticks there and of those around.

@@ -21,7 +21,7 @@ const LOCAL_TRIES: usize = 10;
 const EVERYWHERE: usize = 2;
 
 /// Tries of a window in motion; and from rest, where each later one is slower.
-const TRIES: [usize; 2] = [12, 30];
+const TRIES: [usize; 2] = [12, 18];
 
 /// As published.
 pub const CARE: Care = Care {
@@ -182,10 +182,10 @@ impl Windowed {
             &mut window.times,
             window.motion.0.iter().map(|ramp| ramp.duration_s),
         );
-        let most_s = MAX_SAMPLES * job.bounds.context.fine_period_s;
+        let max_s = MAX_SAMPLES * job.bounds.context.fine_period_s;
         corners[0].speed_mm_per_s >= job.start.state.speed_mm_per_s
             && window.times.len() > 1
-            && window.duration_s() <= most_s
+            && window.duration_s() <= max_s
     }
 }
 
@@ -198,7 +198,7 @@ fn spot(route: &Route, bounds: &Bounds, at_mm: f64, cursor: &mut Cursor) -> Spot
         .min(route.smooth_for_mm(at_mm, cursor))
         .clamp(1e-7, 0.05);
     // Where a rotary axis turns much on little way, that takes long.
-    let most_mm = if leg.course.is_straight() {
+    let max_mm = if leg.course.is_straight() {
         STEP_S * leg.cap_mm_per_s(&at, bounds)
     } else {
         f64::INFINITY
@@ -209,7 +209,7 @@ fn spot(route: &Route, bounds: &Bounds, at_mm: f64, cursor: &mut Cursor) -> Spot
             acceleration_mm_per_s2: leg.least.acceleration_mm_per_s2,
             jerk_mm_per_s3: leg.least.jerk_mm_per_s3,
         },
-        step_mm: step_mm.min(most_mm),
+        step_mm: step_mm.min(max_mm),
         knot_mm,
     }
 }

@@ -41,12 +41,12 @@ impl Tangential {
         f64::midpoint(from_mm_per_s, to_mm_per_s) * self.duration_s(to_mm_per_s - from_mm_per_s)
     }
 
-    /// The highest speed, at most `most_mm_per_s`, that can be reached from `from_mm_per_s` within `way_mm`.
-    pub fn reach_mm_per_s(&self, from_mm_per_s: f64, way_mm: f64, most_mm_per_s: f64) -> f64 {
-        if most_mm_per_s <= from_mm_per_s {
-            return most_mm_per_s;
+    /// The highest speed, at most `max_mm_per_s`, that can be reached from `from_mm_per_s` within `way_mm`.
+    pub fn reach_mm_per_s(&self, from_mm_per_s: f64, way_mm: f64, max_mm_per_s: f64) -> f64 {
+        if max_mm_per_s <= from_mm_per_s {
+            return max_mm_per_s;
         }
-        highest((from_mm_per_s, most_mm_per_s), |speed| {
+        highest((from_mm_per_s, max_mm_per_s), |speed| {
             way_mm - self.way_mm(from_mm_per_s, speed)
         })
     }

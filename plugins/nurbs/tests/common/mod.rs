@@ -4,29 +4,13 @@
 pub mod measure;
 
 use tandem_nurbs::{NurbsPlanner, Options};
-use tandem_rig::Given;
-pub use tandem_rig::{Collected, case, numbers};
+pub use tandem_rig::Collected;
+use tandem_rig::{Given, canonical_curve, curve};
 use tandem_sdk::{AxisLimits, AxisVector, Block, BlockKind, NurbsData, PlannerContext};
 
 pub fn canonical(name: &str) -> (NurbsData, f64) {
-    let case = case("002_nurbs_eval");
-    let curve = case["curves"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .find(|c| c["name"] == name)
-        .unwrap();
-    let points = curve["control_points"].as_array().unwrap();
-    let data = NurbsData {
-        degree: curve["degree"].as_u64().unwrap() as usize,
-        control_points: points
-            .iter()
-            .map(|p| AxisVector::from_slice(&numbers(p)))
-            .collect(),
-        weights: numbers(&curve["weights"]),
-        knots: numbers(&curve["knots"]),
-    };
-    (data, curve["length_mm"].as_f64().unwrap())
+    let entry = canonical_curve(name);
+    (curve(&entry), entry["length_mm"].as_f64().unwrap())
 }
 
 /// A block along `data`, at `feed_mm_per_s`.

@@ -11,12 +11,12 @@ impl Drawn {
         text.key("rough_period_ms", self.rough_ms);
         text.key("fine_period_ms", self.fine_ms);
         text.table("[motion]");
-        let least_mm = if self.planner == Planner::Smooth {
+        let min_mm = if self.planner == Planner::Smooth {
             2e-4
         } else {
             1e-4
         };
-        text.key("path_tolerance_mm", rounded(random.length(least_mm, 1.0)));
+        text.key("path_tolerance_mm", rounded(random.length(min_mm, 1.0)));
         let difference = if random.below(2) == 0 {
             0.0
         } else {

@@ -5,7 +5,7 @@ use tandem_sdk::{Answer, FeedStrategy, PluginError, StrategyContext, Window};
 tandem_sdk::options! {
     pub struct Options {
         /// Mean motor current above which the feed is lowered, A.
-        pub most_current_a: f64 = 8.0,
+        pub max_current_a: f64 = 8.0,
         /// How fast the feed ratio changes at most, 1/s.
         pub ratio_change_per_s: f64 = 2.0,
     }
@@ -30,7 +30,7 @@ impl FeedStrategy for CurrentLimit {
         let currents = window.samples().iter().flat_map(|sample| sample.current_a.0);
         let current_a = currents.fold(0.0, |most: f64, current_a| most.max(current_a.abs()));
         let step = self.0.ratio_change_per_s * self.1.rough_period_s;
-        let wanted = (self.0.most_current_a / current_a).clamp(0.1, 1.0);
+        let wanted = (self.0.max_current_a / current_a).clamp(0.1, 1.0);
         self.2 += (wanted - self.2).clamp(-step, step);
         Ok(Answer::of_ratio(self.2).with_signals(&[current_a]))
     }

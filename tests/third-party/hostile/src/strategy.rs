@@ -29,6 +29,11 @@ impl FeedStrategy for Hostile {
         f64::INFINITY
     }
 
+    fn takes_override(&self) -> bool {
+        self.0.quietly("takes_override");
+        false
+    }
+
     fn update(&mut self, _window: &Window) -> Result<Answer, PluginError> {
         let what = self.0.of("update")?;
         Ok(Answer { ratio: Mischief::number(what, 0.9), request: Request::None, signals: [0.5; 8] })

@@ -10,8 +10,9 @@ use crate::tree::{File, files};
 /// For each package, or folder of packages, what its `[dependencies]` may name of the workspace.
 const ALLOWED: &[(&str, &[&str])] = &[
     ("core/sdk", &[]),
-    ("core/report", &[]),
-    ("core/web", &[]),
+    ("core/view", &[]),
+    ("core/report", &["tandem-view"]),
+    ("core/web", &["tandem-view"]),
     ("core/motion", &["tandem-sdk"]),
     ("core/gcode", &["tandem-motion", "tandem-sdk"]),
     ("core/policy", &["tandem-motion", "tandem-sdk"]),
@@ -76,6 +77,18 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "tandem-sdk",
         ],
     ),
+    (
+        "core/batch",
+        &[
+            "tandem-gcode",
+            "tandem-host",
+            "tandem-machine",
+            "tandem-recorder",
+            "tandem-rings",
+            "tandem-sdk",
+        ],
+    ),
+    ("core/batch-nats", &["tandem-batch"]),
     ("plugins", &["tandem-motion", "tandem-sdk"]),
     // It reads a table of the machine file, and no hardware.
     ("hal-drivers/faults", &["tandem-machine", "tandem-sdk"]),

@@ -1,7 +1,7 @@
 //! What stands beside radius compensation in a line.
 
-use crate::fault::Checked;
 use crate::line::Line;
+use crate::line_error::Checked;
 use crate::state::MotionMode;
 use crate::words::modes::Plane;
 use crate::words::{Group, Shape};
@@ -11,7 +11,7 @@ use crate::words::{Group, Shape};
 pub(crate) fn refuse_company(line: &Line) -> Checked<()> {
     let word = line.state.compensation.word();
     let refuse = |group, other: &str, why: &str| {
-        Err(line.orders.fault(
+        Err(line.orders.error(
             group,
             "compensation",
             format!("{other} {why} while {word} is on: G40 must come before"),

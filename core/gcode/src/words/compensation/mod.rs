@@ -15,9 +15,9 @@ use super::arc;
 use super::circle::{Ends, Parts, Point, extent, tolerance_mm};
 use super::modes::Plane;
 use super::{Action, Group, Word, spindle, tool};
-use crate::fault::{Checked, Fault};
 use crate::item::Item;
 use crate::line::Line;
+use crate::line_error::{Checked, LineError};
 use crate::state::path::NO_MOVE;
 pub(crate) use company::refuse_company;
 use corner::{Corner, Track, along, beside, distance, dot, unit};
@@ -200,11 +200,11 @@ fn on_by_diameter(line: &mut Line, side: f64) -> Checked<()> {
         let message = format!("{} needs D, the diameter of the tool", code(line));
         return Err(line
             .orders
-            .fault(Group::CutterRadius, "word-missing", message));
+            .error(Group::CutterRadius, "word-missing", message));
     };
     if !matches!(line.words.integer(b'L', 0..=9)?, None | Some(0 | 9)) {
         let message = "L1 to L8 are tools whose tip lies beside their centre: only round tools (L0, L9) are known";
-        return Err(line.words.fault(b'L', "refused", message));
+        return Err(line.words.error(b'L', "refused", message));
     }
     let diameter_mm = diameter * line.state.modes.unit_mm;
     on(line, side, diameter_mm)
@@ -220,7 +220,7 @@ fn on(line: &mut Line, side: f64, diameter_mm: f64) -> Checked<()> {
     let refuse = |message: String| {
         Err(line
             .orders
-            .fault(Group::CutterRadius, "compensation", message))
+            .error(Group::CutterRadius, "compensation", message))
     };
     let before = &line.state.compensation;
     if before.code != 400 {
@@ -367,8 +367,8 @@ pub(crate) fn bent(line: &mut Line, ends: &Ends, parts: &Parts, plane: [usize; 2
         if inside && first.arc.radius_mm <= radius_mm {
             let message = format!(
                 "the radius of the arc, {} mm, is not greater than that of the tool, {} mm: it would cut away the inside",
-                crate::fault::show(first.arc.radius_mm),
-                crate::fault::show(radius_mm)
+                crate::line_error::show(first.arc.radius_mm),
+                crate::line_error::show(radius_mm)
             );
             return Err(drawn(line, line.motion_fault("compensation", message)));
         }
@@ -402,7 +402,7 @@ fn pass(line: &mut Line) -> Checked<()> {
     Ok(())
 }
 
-fn entry_fault(line: &Line, message: &str) -> Fault {
+fn entry_fault(line: &Line, message: &str) -> LineError {
     line.motion_fault("compensation", message)
 }
 
@@ -670,19 +670,19 @@ fn check_end(line: &Line, plane: [usize; 2], block: &Block) -> Checked<()> {
     for axis in 0..line.letters.count() {
         if block.end[axis] != block.start[axis] || plane.contains(&axis) {
             line.check_travel(axis, block.end[axis], block.end[axis])
-                .map_err(|fault| beside_line(fault, block.line))?;
+                .map_err(|error| beside_line(error, block.line))?;
         }
     }
     Ok(())
 }
 
-/// Says which line a fault belongs to, that shows only in a later one.
-fn beside_line(mut fault: Fault, line: u32) -> Fault {
+/// Says which line a error belongs to, that shows only in a later one.
+fn beside_line(mut error: LineError, line: u32) -> LineError {
     let _ = write!(
-        fault.message,
+        error.message,
         "; the tool is driven beside the path of line {line}"
     );
-    fault
+    error
 }
 
 /// An arc between true ends.
@@ -718,7 +718,7 @@ fn bend_block(line: &mut Line, plane: [usize; 2], block: &Block, bend: &Bend) ->
     for part in parts.as_slice() {
         for (axis, (low, high)) in plane.into_iter().zip(extent(part)) {
             line.check_travel(axis, low, high)
-                .map_err(|fault| beside_line(fault, block.line))?;
+                .map_err(|error| beside_line(error, block.line))?;
         }
     }
     let mut helix = block.end - block.start;

@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 
 use super::corner::{along, beside};
 use crate::diagnostic::Sketch;
-use crate::fault::{Fault, show};
 use crate::line::Line;
+use crate::line_error::{LineError, show};
 use crate::words::circle::Point;
 
 /// Points that an arc is drawn by.
@@ -45,7 +45,7 @@ impl Programmed {
 
 /// The tool would cut into what the lines leave.
 #[cold]
-pub(super) fn gouge(line: &Line, of: u32, why: &str) -> Fault {
+pub(super) fn gouge(line: &Line, of: u32, why: &str) -> LineError {
     let (word, now) = (line.state.compensation.word(), line.state.line);
     let radius = show(line.state.compensation.radius_mm);
     let message = format!(
@@ -55,13 +55,13 @@ pub(super) fn gouge(line: &Line, of: u32, why: &str) -> Fault {
     drawn(line, line.motion_fault("gouge", message))
 }
 
-/// A fault with the moves around the corner, and the tool beside it.
+/// A error with the moves around the corner, and the tool beside it.
 #[cold]
-pub(super) fn drawn(line: &Line, mut fault: Fault) -> Fault {
+pub(super) fn drawn(line: &Line, mut error: LineError) -> LineError {
     let compensation = &line.state.compensation;
     let moves = compensation.programmed_moves.iter().flatten();
     let towards = beside(compensation.direction, compensation.side);
-    fault.sketch = Some(Box::new(Sketch {
+    error.sketch = Some(Box::new(Sketch {
         axes: compensation
             .plane
             .map(|axis| line.letters.letter(axis) as char),
@@ -69,5 +69,5 @@ pub(super) fn drawn(line: &Line, mut fault: Fault) -> Fault {
         tool_at_mm: along(compensation.programmed, towards, compensation.radius_mm),
         tool_radius_mm: compensation.radius_mm,
     }));
-    fault
+    error
 }

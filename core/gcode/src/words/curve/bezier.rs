@@ -4,8 +4,8 @@ use tandem_sdk::{AxisVector, NurbsData};
 
 use super::places::Origin;
 use super::push_curve;
-use crate::fault::Checked;
 use crate::line::Line;
+use crate::line_error::Checked;
 use crate::words::modes::Plane;
 
 /// The end of the last cubic curve: the block that follows it, and its P and Q, mm.

@@ -4,8 +4,8 @@ use tandem_motion::nurbs::{MAX_DEGREE, NurbsError};
 use tandem_sdk::AxisVector;
 
 use super::{Curve, Dialect, open_curve};
-use crate::fault::{Checked, Fault, show};
 use crate::line::Line;
+use crate::line_error::{Checked, LineError, show};
 use crate::state::letters::{AXIS_MASK, index, mask};
 use crate::words::orders::no_axis;
 
@@ -72,7 +72,7 @@ fn linuxcnc_order(line: &Line, curve: &mut Curve) -> Checked<()> {
         return Ok(());
     };
     match curve.order {
-        Some(before) if before != order as usize => Err(line.words.fault(
+        Some(before) if before != order as usize => Err(line.words.error(
             b'L',
             "nurbs",
             format!("L has been {before} on this curve: it has one order"),
@@ -129,7 +129,7 @@ fn first_fanuc(line: &mut Line, curve: &mut Curve, start: AxisVector) -> Checked
             );
             return Err(line
                 .words
-                .fault(line.letters.letter(axis), "nurbs", message));
+                .error(line.letters.letter(axis), "nurbs", message));
         }
     }
     line.state.path.position = start;
@@ -175,22 +175,22 @@ fn knot(line: &Line, curve: &mut Curve) -> Checked<()> {
         return Err(first_fault(line, "K, the knot of this line, is missing"));
     };
     let (order, index) = (curve.order.unwrap_or(FANUC_ORDER), curve.knots.len());
-    let fault = |message: String| Err(line.words.fault(b'K', "nurbs", message));
+    let error = |message: String| Err(line.words.error(b'K', "nurbs", message));
     if let Some(before) = curve.knots.last().filter(|before| knot < **before) {
-        return fault(format!(
+        return error(format!(
             "knot {} is below the one before it, {}: knots never fall",
             show(knot),
             show(*before)
         ));
     }
     if index < order && curve.knots.first().is_some_and(|first| *first != knot) {
-        return fault(format!(
+        return error(format!(
             "the first {order} knots are equal: the curve begins at its first control point"
         ));
     }
     let (points, degree) = (curve.points.len(), order - 1);
     if index > points && curve.knots.last() != Some(&knot) {
-        return fault(format!(
+        return error(format!(
             "the last {order} knots are equal: the curve ends at its last control point"
         ));
     }
@@ -205,7 +205,7 @@ fn knot(line: &Line, curve: &mut Curve) -> Checked<()> {
         .take_while(|before| **before == knot)
         .count();
     if index == points && alike > 0 {
-        return fault(if alike == index {
+        return error(if alike == index {
             NurbsError::Empty(knot).to_string()
         } else {
             NurbsError::End {
@@ -217,7 +217,7 @@ fn knot(line: &Line, curve: &mut Curve) -> Checked<()> {
         });
     }
     if index < points && alike == index {
-        return fault(
+        return error(
             NurbsError::End {
                 value: knot,
                 count: alike + 1,
@@ -227,7 +227,7 @@ fn knot(line: &Line, curve: &mut Curve) -> Checked<()> {
         );
     }
     if index < points && alike == degree {
-        return fault(
+        return error(
             NurbsError::Multiplicity {
                 value: knot,
                 count: order,
@@ -245,7 +245,7 @@ fn weight_of(line: &Line, letter: u8) -> Checked<f64> {
     match line.words.get(letter) {
         Some(weight) if weight <= 0.0 => {
             let message = format!("the weight {} must be greater than zero", letter as char);
-            Err(line.words.fault(letter, "nurbs", message))
+            Err(line.words.error(letter, "nurbs", message))
         }
         weight => Ok(weight.unwrap_or(1.0)),
     }
@@ -266,12 +266,12 @@ fn only(line: &Line, letters: &str) -> Checked<()> {
         letter as char,
         line.words.exponent(letter)
     );
-    Err(Fault::new(span, "unused-word", message))
+    Err(LineError::new(span, "unused-word", message))
 }
 
-/// A fault at the first word of the line.
-fn first_fault(line: &Line, message: &str) -> Fault {
+/// A error at the first word of the line.
+fn first_fault(line: &Line, message: &str) -> LineError {
     let span = line.words.g.as_slice().first().map(|code| code.span);
     let word = line.words.first_of(u32::MAX).map(|(_, span)| span);
-    Fault::new(span.or(word).unwrap_or_default(), "nurbs", message)
+    LineError::new(span.or(word).unwrap_or_default(), "nurbs", message)
 }

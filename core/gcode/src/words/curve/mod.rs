@@ -11,9 +11,9 @@ use tandem_sdk::{AxisVector, Block, BlockKind, NurbsData};
 
 use super::modes::FeedMode;
 use super::{Action, Group, Shape, Word};
-use crate::fault::{Checked, Fault, Span};
 use crate::item::Item;
 use crate::line::Line;
+use crate::line_error::{Checked, LineError, Span};
 use crate::state::MotionMode;
 use crate::syntax::line_words::LineWords;
 use places::{Origin, Places};
@@ -220,7 +220,7 @@ impl Curves {
         if known {
             Ok(false)
         } else {
-            Err(Fault::new(code.span, "nurbs", message))
+            Err(LineError::new(code.span, "nurbs", message))
         }
     }
 
@@ -232,7 +232,7 @@ impl Curves {
                     "the program ends within the curve that line {} opens",
                     curve.line
                 );
-                Err(Fault::new(Span::new(0, 1), "nurbs", message))
+                Err(LineError::new(Span::new(0, 1), "nurbs", message))
             }
             _ => Ok(()),
         }
@@ -267,12 +267,12 @@ pub(crate) fn curve_line(line: &mut Line) -> Checked<()> {
     match done {
         Ok(false) => line.state.curves.open = Some(curve),
         Ok(true) => return close_curve(line, curve),
-        Err(fault) => {
+        Err(error) => {
             // A broken curve of Fanuc's ends where a line without a knot comes.
             let known = std::mem::replace(&mut curve.broken, true);
             line.state.curves.open =
                 Some(curve).filter(|c| c.dialect == Dialect::Fanuc || !ends_curve(line.words));
-            return if known { Ok(()) } else { Err(fault) };
+            return if known { Ok(()) } else { Err(error) };
         }
     }
     Ok(())
@@ -336,7 +336,7 @@ fn push_curve(line: &mut Line, origin: &Origin, data: NurbsData) -> Checked<()> 
     Ok(())
 }
 
-fn curve_fault(line: &Line, opened: u32, error: &NurbsError) -> Fault {
+fn curve_fault(line: &Line, opened: u32, error: &NurbsError) -> LineError {
     let message = if opened == line.state.line {
         error.to_string()
     } else {
@@ -355,14 +355,14 @@ fn slides(line: &Line, data: &NurbsData) -> bool {
 fn check_curve_travel(line: &Line, curve: &Nurbs, origin: &Origin) -> Checked<()> {
     for axis in 0..line.letters.count() {
         let ((low, high), (min, max)) = (curve.extent(axis), line.config.travel_mm[axis]);
-        let beyond = |fault| {
+        let beyond = |error| {
             let (limit, above) = if high > max {
                 (max, true)
             } else {
                 (min, false)
             };
             origin.blame_travel(
-                fault,
+                error,
                 curve,
                 (axis, line.letters.letter(axis)),
                 limit,

@@ -3,7 +3,7 @@
 use tandem_motion::nurbs::{Nurbs, NurbsError};
 use tandem_sdk::NurbsData;
 
-use crate::fault::{Fault, SourceLine, Span};
+use crate::line_error::{LineError, SourceLine, Span};
 
 /// The lines of a curve, one for each control point; those of knots that stand alone follow.
 #[derive(Clone, Debug, Default)]
@@ -22,11 +22,11 @@ impl Places {
         }
     }
 
-    /// Moves `fault` to the word `letter` of the line `index`, or to the first word of that line. A line that is still
+    /// Moves `line_error` to the word `letter` of the line `index`, or to the first word of that line. A line that is still
     /// being read keeps it.
-    fn point_out(&self, mut fault: Fault, index: usize, letter: u8) -> Fault {
+    fn point_out(&self, mut line_error: LineError, index: usize, letter: u8) -> LineError {
         let Some((number, to)) = self.lines.get(index).copied() else {
-            return fault;
+            return line_error;
         };
         let from = index
             .checked_sub(1)
@@ -36,12 +36,12 @@ impl Places {
         let word = words
             .iter()
             .find(|span| text[span.start as usize].eq_ignore_ascii_case(&letter));
-        fault.span = word.or(words.first()).copied().unwrap_or_default();
-        fault.line = Some(Box::new(SourceLine {
+        line_error.span = word.or(words.first()).copied().unwrap_or_default();
+        line_error.line = Some(Box::new(SourceLine {
             number,
             text: text.to_vec(),
         }));
-        fault
+        line_error
     }
 }
 
@@ -92,8 +92,8 @@ impl Origin {
         }
     }
 
-    /// Moves `fault` to the word that `error` is about, where it is about one.
-    pub fn blame(&self, fault: Fault, error: &NurbsError, data: &NurbsData) -> Fault {
+    /// Moves `line_error` to the word that `error` is about, where it is about one.
+    pub fn blame(&self, line_error: LineError, error: &NurbsError, data: &NurbsData) -> LineError {
         let span = |from: f64| data.knots.partition_point(|knot| *knot <= from) - 1;
         match *error {
             NurbsError::WeightRatio { .. } => {
@@ -101,28 +101,28 @@ impl Origin {
                 let all = 0..data.weights.len();
                 let later = all.clone().min_by(by_size).max(all.rev().max_by(by_size));
                 self.places
-                    .point_out(fault, later.unwrap_or(0), self.weight)
+                    .point_out(line_error, later.unwrap_or(0), self.weight)
             }
-            NurbsError::Close { index, .. } => self.places.point_out(fault, index + 1, b'K'),
+            NurbsError::Close { index, .. } => self.places.point_out(line_error, index + 1, b'K'),
             // Between two knots all control points are alike in what counts: the second is the first that repeats it.
             NurbsError::NotCounted { from, .. } => {
                 self.places
-                    .point_out(fault, span(from) - data.degree + 1, 0)
+                    .point_out(line_error, span(from) - data.degree + 1, 0)
             }
-            _ => fault,
+            _ => line_error,
         }
     }
 
-    /// Moves `fault` to the control point that draws the curve beyond `limit` on `axis`: with its weight it lies
+    /// Moves `line_error` to the control point that draws the curve beyond `limit` on `axis`: with its weight it lies
     /// furthest out, `above` or below.
     pub fn blame_travel(
         &self,
-        fault: Fault,
+        line_error: LineError,
         curve: &Nurbs,
         axis: (usize, u8),
         limit: f64,
         above: bool,
-    ) -> Fault {
+    ) -> LineError {
         let out = |index: usize| {
             let (point, weight) = curve.control_point(index);
             weight * (point[axis.0] - limit) * if above { 1.0 } else { -1.0 }
@@ -130,13 +130,15 @@ impl Origin {
         let furthest = (0..curve.points())
             .rev()
             .max_by(|a, b| out(*a).total_cmp(&out(*b)));
-        let mut fault = self.places.point_out(fault, furthest.unwrap_or(0), axis.1);
-        if fault.line.is_some() {
-            fault
+        let mut line_error = self
+            .places
+            .point_out(line_error, furthest.unwrap_or(0), axis.1);
+        if line_error.line.is_some() {
+            line_error
                 .message
                 .push_str("; this control point draws the curve there");
         }
-        fault
+        line_error
     }
 }
 

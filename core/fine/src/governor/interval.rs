@@ -1,0 +1,101 @@
+//! What the limits of an axis leave of σ̈ in a period: its acceleration and its jerk are linear in it.
+
+use super::tuning::MIN_JERK_SHARE;
+
+/// The rate of program time at a point of a period, were σ̈ zero.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RateAt {
+    pub(super) sigma: f64,
+    pub(super) rate_per_s: f64,
+    /// Share of the period that has passed there: for as long as that σ̈ acts.
+    pub(super) part: f64,
+    pub(super) period_s: f64,
+}
+
+/// An interval of σ̈.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Interval {
+    pub(super) low: f64,
+    pub(super) high: f64,
+}
+
+impl Interval {
+    pub(super) const ALL: Self = Self {
+        low: f64::NEG_INFINITY,
+        high: f64::INFINITY,
+    };
+
+    /// Keeps `|constant + slope·x| ≤ most`.
+    pub(super) fn keep(&mut self, constant: f64, slope: f64, most: f64) {
+        // A constant beyond the limit that nothing can change leaves no interval; rounding is not such a case.
+        if slope.abs() < f64::MIN_POSITIVE {
+            return;
+        }
+        let (a, b) = ((-most - constant) / slope, (most - constant) / slope);
+        if a.is_nan() || b.is_nan() {
+            return;
+        }
+        if a < b {
+            self.narrow(a, b);
+        } else {
+            self.narrow(b, a);
+        }
+    }
+
+    /// Keeps what lies between two numbers: an instruction each, where `f64::max` also looks for what is none.
+    pub(super) fn narrow(&mut self, low: f64, high: f64) {
+        self.low = if low > self.low { low } else { self.low };
+        self.high = if high < self.high { high } else { self.high };
+    }
+
+    /// Keeps the acceleration `q″σ² + q′σ̇` of an axis within `left`, or what the plan itself takes of it there. `motion` is its
+    /// velocity and acceleration in the plan.
+    #[inline]
+    pub(super) fn keep_acceleration(&mut self, motion: [f64; 2], at: &RateAt, left: f64) {
+        let [velocity, acceleration] = motion;
+        let planned = at.sigma * at.sigma * acceleration;
+        self.keep(
+            planned + velocity * at.rate_per_s,
+            velocity * at.part * at.period_s,
+            left.max(planned.abs()),
+        );
+    }
+
+    /// Keeps the jerk `q‴σ³ + 3q″σσ̇ + q′σ̈` of an axis within `left`, or a little more than the plan itself takes of it there; and
+    /// `beyond` more than that, mm/s³. `motion` is its velocity, acceleration and jerk in the plan.
+    #[inline]
+    pub(super) fn keep_jerk(
+        &mut self,
+        motion: [f64; 3],
+        at: &RateAt,
+        (left, limit): (f64, f64),
+        beyond: f64,
+    ) {
+        let [velocity, acceleration, jerk] = motion;
+        let planned = at.sigma * at.sigma * at.sigma * jerk;
+        let turning = 3.0 * acceleration * at.sigma;
+        let most = left.max(planned.abs() + MIN_JERK_SHARE * limit) + beyond;
+        self.keep(
+            planned + turning * at.rate_per_s,
+            velocity + turning * at.part * at.period_s,
+            most,
+        );
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.low > self.high
+    }
+
+    pub(super) fn contains(&self, value: f64) -> bool {
+        self.low <= value && value <= self.high
+    }
+
+    /// The value nearest to `wanted`; of an empty interval its middle.
+    pub(super) fn nearest(&self, wanted: f64) -> f64 {
+        if self.is_empty() {
+            f64::midpoint(self.low, self.high)
+        } else {
+            wanted.clamp(self.low, self.high)
+        }
+    }
+}

@@ -1,0 +1,227 @@
+//! Whether the rate of program time can be made constant again. A change of the rate is begun only where it can: that keeps the jerk
+//! limit to its end.
+//!
+//! A constant σ is admissible wherever the plan is. So σ̈ of a period is good if from its end on σ̇ can be brought to zero
+//! within the limits and within 0 ≤ σ ≤ 1, tried out period by period on the plan ahead. The way that was found is kept:
+//! where the next period finds no better one, it follows that way to its end.
+
+use super::Governor;
+use super::interval::{Interval, RateAt};
+use super::tuning::{ACCELERATION_SHARE, JERK_SHARE, RECOVERY_PERIODS, RECOVERY_RAMPS};
+use crate::horizon::Horizon;
+use crate::plan_ahead::{Motion, PlanCursor};
+use crate::steps::{AROUND, Recent, Steps};
+
+/// Program time that is none, s.
+const NONE_S: f64 = 1e-9;
+/// Tries between the σ̈ wanted and the one that makes σ constant.
+const HALVINGS: u32 = 4;
+
+/// σ̈ of the periods of a way at whose end σ is constant, 1/s².
+#[derive(Debug)]
+pub(super) struct Recovery {
+    changes_per_s2: Box<[f64]>,
+    count: usize,
+    passed: usize,
+}
+
+impl Recovery {
+    /// A way without periods, with room for the longest.
+    pub(super) fn new() -> Self {
+        Self {
+            changes_per_s2: vec![0.0; RECOVERY_PERIODS[1] as usize].into_boxed_slice(),
+            count: 0,
+            passed: 0,
+        }
+    }
+
+    /// Forgets the way: σ is constant.
+    pub(super) fn clear(&mut self) {
+        (self.count, self.passed) = (0, 0);
+    }
+
+    fn push(&mut self, change_per_s2: f64) {
+        self.changes_per_s2[self.count] = change_per_s2;
+        self.count += 1;
+    }
+
+    /// The next period of the way, and whether it is the last.
+    pub(super) fn next(&mut self) -> Option<(f64, bool)> {
+        let change_per_s2 = *self.changes_per_s2[..self.count].get(self.passed)?;
+        self.passed += 1;
+        Some((change_per_s2, self.passed == self.count))
+    }
+}
+
+/// The rate of program time, and where it is on the plan.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RateState<'a> {
+    pub sigma: f64,
+    pub rate_per_s: f64,
+    pub place: PlanCursor<'a>,
+    /// Steps of the plan that the next samples show.
+    pub recent: Recent,
+}
+
+impl RateState<'_> {
+    /// Goes on for a period.
+    pub(super) fn pass(&mut self, change_per_s2: f64, h: f64) {
+        let (sigma, rate) = (self.sigma, self.rate_per_s);
+        let mut left_s = h * (sigma + h * (rate / 2.0 + h * change_per_s2 / 6.0));
+        let mut crossed: Option<Steps> = None;
+        while left_s > NONE_S {
+            left_s = self.place.advance(left_s);
+            if left_s > NONE_S
+                && let Some(steps) = self.place.step()
+            {
+                crossed.get_or_insert_default().join(&steps);
+            }
+        }
+        self.recent.pass(crossed.as_ref());
+        self.sigma = sigma + h * (rate + h * change_per_s2 / 2.0);
+        self.rate_per_s = rate + h * change_per_s2;
+    }
+}
+
+impl Governor {
+    /// The σ̈ nearest to `wanted` from which σ can be made constant within the limits, with the way that does it in
+    /// `self.recovery`; `None` where none is found.
+    pub(super) fn recoverable(
+        &mut self,
+        wanted: f64,
+        here: RateState<'_>,
+        horizon: &Horizon,
+    ) -> Option<f64> {
+        let h = self.period_s;
+        let range = self.range(&here, horizon)?;
+        let mut tries = |change: f64| {
+            let mut way = here;
+            way.pass(change, h);
+            let found = self.recovers(way, horizon);
+            if found {
+                std::mem::swap(&mut self.recovery, &mut self.tried);
+            }
+            found
+        };
+        let wanted = range.nearest(wanted);
+        if tries(wanted) {
+            return Some(wanted);
+        }
+        let (mut good, mut bad) = (range.nearest(-here.rate_per_s / h), wanted);
+        let mut found = None;
+        for _ in 0..HALVINGS {
+            let between = f64::midpoint(good, bad);
+            if tries(between) {
+                (good, found) = (between, Some(between));
+            } else {
+                bad = between;
+            }
+        }
+        found
+    }
+
+    /// Whether σ becomes constant; the way that does it is noted in `self.tried`.
+    fn recovers(&mut self, mut way: RateState<'_>, horizon: &Horizon) -> bool {
+        let h = self.period_s;
+        let [least, most] = RECOVERY_PERIODS;
+        let periods = (RECOVERY_RAMPS * horizon.reach_s / h).clamp(least, most) as u32;
+        self.tried.clear();
+        for _ in 0..periods {
+            if !(0.0..=1.0).contains(&way.sigma) {
+                return false;
+            }
+            if way.rate_per_s == 0.0 {
+                return true;
+            }
+            // What is not queued yet could be anything.
+            let Some(range) = self.range(&way, horizon).filter(|_| way.place.is_known()) else {
+                return false;
+            };
+            let steady = -way.rate_per_s / h;
+            let change = range.nearest(steady);
+            self.tried.push(change);
+            way.pass(change, h);
+            if change == steady {
+                way.rate_per_s = 0.0;
+            }
+        }
+        false
+    }
+
+    /// σ̈ that the limits allow in the period that begins here.
+    fn range(&self, way: &RateState<'_>, horizon: &Horizon) -> Option<Interval> {
+        let h = self.period_s;
+        let mut interval = Interval::ALL;
+        let whole_s = h * (way.sigma + h * way.rate_per_s / 2.0).clamp(0.0, 1.0);
+        let (mut place, mut left_s) = (way.place, whole_s);
+        let bounds = (horizon, &self.reserve(way));
+        self.keep_at(way, 0.0, &place.motion(), bounds, &mut interval);
+        while left_s > NONE_S {
+            // With the middle, what samples show of a quadratic course is a mean of what is kept here (Simpson's rule).
+            let stretch_s = place.stretch_s(left_s);
+            for end_s in [left_s - stretch_s / 2.0, left_s - stretch_s] {
+                place.advance(stretch_s / 2.0);
+                self.keep_at(
+                    way,
+                    1.0 - end_s / whole_s,
+                    &place.motion(),
+                    bounds,
+                    &mut interval,
+                );
+            }
+            left_s -= stretch_s;
+            if left_s > NONE_S {
+                place.step();
+                self.keep_at(
+                    way,
+                    1.0 - left_s / whole_s,
+                    &place.motion(),
+                    bounds,
+                    &mut interval,
+                );
+            }
+        }
+        if whole_s <= NONE_S {
+            // From rest next to no program time passes in the period, but σ̇ grows in it, and the velocity of the axes.
+            self.keep_at(way, 1.0, &place.motion(), bounds, &mut interval);
+        }
+        (!interval.is_empty()).then_some(interval)
+    }
+
+    /// Steps of the plan that the samples of this period and the next ones show together.
+    pub(super) fn reserve(&self, way: &RateState<'_>) -> Steps {
+        let mut steps = way.recent.steps();
+        let (h, periods) = (self.period_s, f64::from(AROUND) + 1.0);
+        let soon = (way.sigma + periods * h * way.rate_per_s.max(0.0)).clamp(0.0, 1.0);
+        steps.join(&way.place.steps_within(periods * h * soon));
+        steps
+    }
+
+    /// Jerk and acceleration at a point of the period, the share `part` of its program time from its start.
+    fn keep_at(
+        &self,
+        way: &RateState<'_>,
+        part: f64,
+        motion: &Motion,
+        (horizon, reserve): (&Horizon, &Steps),
+        keep: &mut Interval,
+    ) {
+        let h = self.period_s;
+        let at = RateAt {
+            sigma: (way.sigma + part * h * way.rate_per_s).clamp(0.0, 1.0),
+            rate_per_s: way.rate_per_s,
+            part,
+            period_s: h,
+        };
+        for (axis, (acceleration_limit, jerk_limit)) in horizon.limits() {
+            let velocity = motion.velocity[axis];
+            let acceleration = motion.acceleration[axis];
+            let left = JERK_SHARE * jerk_limit - reserve.jerk_mm_per_s3(axis, at.sigma, h);
+            let planned = [velocity, acceleration, motion.jerk[axis]];
+            keep.keep_jerk(planned, &at, (left, jerk_limit), 0.0);
+            let left = ACCELERATION_SHARE * acceleration_limit
+                - reserve.acceleration_mm_per_s2(axis, at.sigma, h);
+            keep.keep_acceleration([velocity, acceleration], &at, left);
+        }
+    }
+}

@@ -1,0 +1,346 @@
+//! The governor where jerk is limited: the rate of program time is smooth itself.
+//!
+//! With q the plan in program time an axis jerks by `q‴σ³ + 3q″σσ̇ + q′σ̈`. What is chosen for a period is σ̈: as near to
+//! what two laws ask for as leaves a way on which σ̇ comes to zero within the limits (`keep_limits.rs`).
+
+use super::Governor;
+use super::interval::{Interval, RateAt};
+use super::keep_limits::RateState;
+use super::rest_at::RestAt;
+use super::tuning::{
+    APPROACH_END_FACTOR, CLEARLY_LONGER, EXCESSES, ORDER3_LIMIT_SHARE, SNAP_SHARE,
+};
+use crate::horizon::Horizon;
+use crate::law::{stop_s, to_rest};
+use crate::plan_ahead::PlanCursor;
+use crate::steps::{Recent, Steps};
+
+/// What is asked of the coming period.
+#[derive(Clone, Copy, Debug)]
+pub struct Aim {
+    /// Rate of program time to reach.
+    pub sigma: f64,
+    /// Path speed not to exceed, mm/s.
+    pub speed_mm_per_s: f64,
+    /// Share of the programmed feeds ahead that is not to be exceeded there; infinite where the plan keeps what is asked.
+    pub ratio: f64,
+    /// Derivatives of the plan's path coordinate here by program time.
+    pub path: [f64; 3],
+    /// Where to rest.
+    pub rest_at: Option<RestAt>,
+}
+
+/// What was chosen for the period.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Chosen {
+    /// Program time that passes, s.
+    pub delta_s: f64,
+    /// No σ̈ keeps the jerk limit: velocity and acceleration are kept.
+    pub relaxed: bool,
+}
+
+impl Governor {
+    /// Chooses the rate for this period where jerk is limited, and takes it. `place` is where the plan is, `recent` what of
+    /// its steps the next samples show.
+    pub fn smooth(
+        &mut self,
+        aim: &Aim,
+        horizon: &Horizon,
+        place: PlanCursor<'_>,
+        recent: Recent,
+    ) -> Chosen {
+        let here = RateState {
+            sigma: self.sigma,
+            rate_per_s: self.rate_per_s,
+            place,
+            recent,
+        };
+        let wanted = if aim.speed_mm_per_s > 0.0 && aim.speed_mm_per_s.min(aim.ratio).is_finite() {
+            self.wanted_below(aim, horizon, &here)
+        } else {
+            self.wanted_freely(aim, horizon, &place)
+        };
+        let wanted = match &aim.rest_at {
+            Some(rest) => {
+                let stop = Aim {
+                    speed_mm_per_s: 0.0,
+                    ..*aim
+                };
+                let slowest = self.wanted_freely(&stop, horizon, &place);
+                self.wanted_to_rest_at(rest, (slowest, wanted), &here)
+            }
+            None => wanted,
+        };
+        if wanted == 0.0 && self.rate_per_s == 0.0 {
+            return Chosen {
+                delta_s: self.sigma * self.period_s,
+                relaxed: false,
+            };
+        }
+        let chosen = match self.recoverable(wanted, here, horizon) {
+            Some(change) => Chosen {
+                delta_s: self.pass(change),
+                relaxed: false,
+            },
+            None => self.go_on(horizon, &self.reserve(&here)),
+        };
+        self.end_approach(aim, horizon);
+        chosen
+    }
+
+    /// Follows the way that was found last, at whose end σ is constant.
+    fn go_on(&mut self, horizon: &Horizon, reserve: &Steps) -> Chosen {
+        if self.rate_per_s == 0.0 {
+            return Chosen {
+                delta_s: self.pass(0.0),
+                relaxed: false,
+            };
+        }
+        let Some((change, last)) = self.recovery.next() else {
+            return self.relaxed(horizon, reserve);
+        };
+        let delta_s = self.pass(change);
+        if last {
+            self.rate_per_s = 0.0;
+        }
+        Chosen {
+            delta_s,
+            relaxed: false,
+        }
+    }
+
+    /// Makes σ constant as soon as velocity and acceleration allow it, with no more jerk than that takes.
+    fn relaxed(&mut self, horizon: &Horizon, reserve: &Steps) -> Chosen {
+        let mut accelerations = Interval::ALL;
+        self.accelerations(horizon, reserve, &mut accelerations);
+        let mut all = accelerations;
+        self.jerks(horizon, reserve, 0.0, &mut all);
+        let mut least = all;
+        for excess in EXCESSES {
+            if !least.is_empty() {
+                break;
+            }
+            least = accelerations;
+            self.jerks(horizon, reserve, excess, &mut least);
+        }
+        let steady = -self.rate_per_s / self.period_s;
+        let chosen = if least.is_empty() {
+            accelerations.nearest(steady)
+        } else {
+            least.nearest(steady)
+        };
+        let chosen = accelerations.nearest(self.landing(chosen));
+        let before = self.rate_per_s;
+        let delta_s = self.pass(chosen);
+        // Where σ has met an end of its range, σ̇ ended there and not as chosen.
+        let change = (self.rate_per_s - before) / self.period_s;
+        Chosen {
+            delta_s,
+            relaxed: all.is_empty() || !all.contains(change),
+        }
+    }
+
+    /// `chosen`, or the σ̈ that is needed to come to the end of the range with σ constant, evenly from here on.
+    fn landing(&self, chosen: f64) -> f64 {
+        let (h, rate) = (self.period_s, self.rate_per_s);
+        let room = if rate > 0.0 {
+            1.0 - self.sigma
+        } else {
+            self.sigma
+        };
+        let periods = (2.0 * room / (h * rate.abs())).floor().max(1.0);
+        let even = -rate / (periods * h);
+        if rate > 0.0 {
+            chosen.min(even)
+        } else {
+            chosen.max(even)
+        }
+    }
+
+    /// Ends an approach: what rounding leaves of it is far below what a period may change.
+    fn end_approach(&mut self, aim: &Aim, horizon: &Horizon) {
+        let h = self.period_s;
+        let most = SNAP_SHARE * horizon.rate_change_per_s2.min(1.0 / (h * h)) * h;
+        let target = if aim.speed_mm_per_s == 0.0 {
+            0.0
+        } else {
+            aim.sigma
+        };
+        if (self.sigma - target).abs() < most * h && self.rate_per_s.abs() < most {
+            (self.sigma, self.rate_per_s) = (target, 0.0);
+        }
+    }
+
+    /// σ̈ that reaches the aim soonest, in small steps.
+    fn wanted_freely(&self, aim: &Aim, horizon: &Horizon, place: &PlanCursor<'_>) -> f64 {
+        let wanted = self
+            .wanted(aim, horizon)
+            .min(self.wanted_by_slowest(aim, horizon, place));
+        self.small(wanted, horizon)
+    }
+
+    /// σ̈ that reaches the aim soonest, were there no limits but those of the approach.
+    fn wanted(&self, aim: &Aim, horizon: &Horizon) -> f64 {
+        let h = self.period_s;
+        let [speed, acceleration, jerk] = aim.path;
+        let most = ORDER3_LIMIT_SHARE * horizon.rate_change_per_s2;
+        let free = if most.is_finite() {
+            self.approach(
+                self.sigma - aim.sigma,
+                horizon.approach_jerk_share * most,
+                most,
+            )
+        } else {
+            0.0
+        };
+        let (sigma, rate) = (self.sigma, self.rate_per_s);
+        let along = sigma * sigma * acceleration + speed * rate;
+        let path_jerk = horizon.path_jerk_to_rest(sigma, sigma * speed, along);
+        let path_jerk = ORDER3_LIMIT_SHARE * path_jerk.min(speed * horizon.max_change_per_s2);
+        if aim.speed_mm_per_s.is_infinite() || speed <= 0.0 || !path_jerk.is_finite() {
+            return free;
+        }
+        let over = sigma * speed - aim.speed_mm_per_s;
+        if over == 0.0 && along == 0.0 {
+            return free.min(0.0);
+        }
+        let asked = to_rest(
+            over - h * along / 2.0,
+            along,
+            horizon.approach_jerk_share * path_jerk,
+            APPROACH_END_FACTOR * path_jerk,
+            h,
+        );
+        let planned = sigma * (sigma * sigma * jerk + 3.0 * acceleration * rate);
+        let capped = (asked - planned) / speed;
+        // At its bound the law of the rate only says that its aim is far.
+        if free < most {
+            free.min(capped)
+        } else {
+            capped
+        }
+    }
+
+    /// The same to rest soonest, by the axis that alone would need longest, where that is clearly longer than what the path
+    /// takes by its speed: an axis that is slow to turn round decides, though the path hardly has its direction yet.
+    fn wanted_by_slowest(&self, aim: &Aim, horizon: &Horizon, place: &PlanCursor<'_>) -> f64 {
+        let (h, sigma, rate) = (self.period_s, self.sigma, self.rate_per_s);
+        let [speed, acceleration, _] = aim.path;
+        if aim.speed_mm_per_s > 0.0 || sigma == 0.0 || speed <= 0.0 {
+            return f64::INFINITY;
+        }
+        let along = sigma * sigma * acceleration + speed * rate;
+        let path_jerk = ORDER3_LIMIT_SHARE * horizon.path_jerk_to_rest(sigma, sigma * speed, along);
+        let path_s = stop_s(sigma * speed, along, f64::INFINITY, path_jerk);
+        let (mut longest_s, mut wanted) = (CLEARLY_LONGER * path_s + 2.0 * h, f64::INFINITY);
+        let motion = place.motion();
+        for (axis, (most, jerk)) in horizon.limits() {
+            let velocity = motion.velocity[axis];
+            let turning = sigma * motion.acceleration[axis];
+            let (fast, changing) = (sigma * velocity, sigma * turning + velocity * rate);
+            let axis_s = stop_s(fast, changing, most, ORDER3_LIMIT_SHARE * jerk);
+            if axis_s > longest_s && velocity != 0.0 {
+                let planned = sigma * sigma * sigma * motion.jerk[axis] + 3.0 * turning * rate;
+                let asked = to_rest(
+                    fast - h * changing / 2.0,
+                    changing,
+                    horizon.approach_jerk_share * ORDER3_LIMIT_SHARE * jerk,
+                    APPROACH_END_FACTOR * ORDER3_LIMIT_SHARE * jerk,
+                    h,
+                );
+                (longest_s, wanted) = (axis_s, (asked - planned) / velocity);
+            }
+        }
+        wanted
+    }
+
+    /// `wanted` in small steps, which the limits do not ask for where next to nothing moves; larger ones to end an approach.
+    pub(super) fn small(&self, wanted: f64, horizon: &Horizon) -> f64 {
+        let small = horizon.max_change_per_s2;
+        let (down, up) = if self.rate_per_s < 0.0 {
+            (small, APPROACH_END_FACTOR * small)
+        } else {
+            (APPROACH_END_FACTOR * small, small)
+        };
+        wanted.clamp(-down, up)
+    }
+
+    /// σ̈ that brings the rate to `sigma` soonest; infinite where that is too far for the law to say more.
+    pub(super) fn freely(&self, sigma: f64, horizon: &Horizon) -> f64 {
+        let most = ORDER3_LIMIT_SHARE * horizon.rate_change_per_s2;
+        if !most.is_finite() {
+            return f64::INFINITY;
+        }
+        let free = self.approach(self.sigma - sigma, horizon.approach_jerk_share * most, most);
+        if free < most { free } else { f64::INFINITY }
+    }
+
+    fn approach(&self, off: f64, gentle: f64, most: f64) -> f64 {
+        if off == 0.0 && self.rate_per_s == 0.0 {
+            return 0.0;
+        }
+        to_rest(
+            off - self.period_s * self.rate_per_s / 2.0,
+            self.rate_per_s,
+            gentle,
+            most,
+            self.period_s,
+        )
+    }
+
+    /// Acceleration at the points of the period, at the rate with which it ends.
+    fn accelerations(&self, horizon: &Horizon, reserve: &Steps, interval: &mut Interval) {
+        let h = self.period_s;
+        let end = RateAt {
+            sigma: (self.sigma + h * self.rate_per_s).clamp(0.0, 1.0),
+            rate_per_s: self.rate_per_s,
+            part: 1.0,
+            period_s: h,
+        };
+        for point in horizon.iter().take_while(|p| p.offset_s <= h) {
+            for (axis, (limit, _)) in horizon.limits() {
+                let reserved = reserve.acceleration_mm_per_s2(axis, end.sigma, h);
+                let motion = [point.velocity[axis], point.acceleration[axis]];
+                interval.keep_acceleration(motion, &end, ORDER3_LIMIT_SHARE * limit - reserved);
+            }
+        }
+    }
+
+    /// Jerk at the points of the period, up to `excess` of the limit beyond it.
+    fn jerks(&self, horizon: &Horizon, reserve: &Steps, excess: f64, interval: &mut Interval) {
+        let (h, rate) = (self.period_s, self.rate_per_s);
+        for point in horizon.iter().take_while(|p| p.offset_s <= h) {
+            let part = (point.offset_s / (h * self.sigma).max(f64::MIN_POSITIVE)).min(1.0);
+            let at = RateAt {
+                sigma: (self.sigma + part * h * rate).clamp(0.0, 1.0),
+                rate_per_s: rate,
+                part,
+                period_s: h,
+            };
+            for (axis, (_, limit)) in horizon.limits() {
+                let left = ORDER3_LIMIT_SHARE * limit - reserve.jerk_mm_per_s3(axis, at.sigma, h);
+                let motion = [
+                    point.velocity[axis],
+                    point.acceleration[axis],
+                    point.jerk[axis],
+                ];
+                interval.keep_jerk(motion, &at, (left, limit), excess * limit);
+            }
+        }
+    }
+
+    /// Takes σ̈ for this period; gives the program time that passes, s.
+    fn pass(&mut self, change_per_s2: f64) -> f64 {
+        let (h, sigma, rate) = (self.period_s, self.sigma, self.rate_per_s);
+        self.sigma = sigma + h * (rate + h * change_per_s2 / 2.0);
+        self.rate_per_s = rate + h * change_per_s2;
+        let mut delta_s = h * (sigma + h * (rate / 2.0 + h * change_per_s2 / 6.0));
+        if self.sigma <= 0.0 || self.sigma >= 1.0 {
+            // There it stays: what the last step would have gone beyond is the law's rounding.
+            self.sigma = self.sigma.clamp(0.0, 1.0);
+            self.rate_per_s = 0.0;
+            delta_s = delta_s.clamp(0.0, h);
+        }
+        delta_s
+    }
+}

@@ -1,0 +1,119 @@
+//! The constants that shape how the rate of program time changes: what each is for and its unit, and where another value was tried,
+//! what was seen with it. A share is of the limit that it is named after, without unit.
+
+/// Order 2: share of the acceleration limit that is aimed at; the rest covers the curvature of the plan within a period.
+pub const ORDER2_LIMIT_SHARE: f64 = 0.999;
+
+/// Order 2: share of the acceleration limit that slowing down for a feed ahead counts on: a period that turns from one segment
+/// to the next leaves less of both.
+pub const FEEDS_AHEAD_LIMIT_SHARE: f64 = 0.98;
+
+/// Order 3: share of the limits of jerk and acceleration that approaches aim at; the rest covers what changes within a period.
+pub const ORDER3_LIMIT_SHARE: f64 = 0.995;
+
+/// Order 3: share of the acceleration limit that is used at the points of a period: between them it may be higher.
+pub const ACCELERATION_SHARE: f64 = 0.998;
+
+/// Order 3: share of the jerk limit that is used at the points of a period, for the same reason.
+pub const JERK_SHARE: f64 = 0.997;
+
+/// Order 3: share of the jerk limit that a change of the rate has at least, where the plan uses all of it: without any it would
+/// never leave a rest there. The one tolerance on jerk covers it.
+pub const MIN_JERK_SHARE: f64 = 0.006;
+
+/// Order 3: by which share of the limit jerk goes beyond it where it must: the first that leaves a rate is taken.
+pub const EXCESSES: [f64; 8] = [0.01, 0.03, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2];
+
+/// Order 3: how many times as long as the path by its speed an axis must need to decide how a stop begins. On a line both need
+/// the same, and the law of the path, which knows no single axis, comes in to rest without chatter.
+pub const CLEARLY_LONGER: f64 = 1.2;
+
+/// Order 3: below this share of what one period can change, a rate is where it was to go.
+pub const SNAP_SHARE: f64 = 1e-3;
+
+/// Order 3: time in which the rate must have become constant, in units of the longest time in which an axis changes its
+/// acceleration from none to its limit.
+pub const RECOVERY_RAMPS: f64 = 3.2;
+
+/// Order 3: least and most fine periods in which the rate must have become constant, whatever the limits. Where an axis reaches its
+/// acceleration within a few periods, a change of the rate in small steps still needs some; and the work of a period is bounded.
+pub const RECOVERY_PERIODS: [f64; 2] = [16.0, 640.0];
+
+/// Order 3: share of the jerk that an approach counts on where the plan turns or changes its speed ahead.
+pub const APPROACH_JERK_SHARE: f64 = 0.8;
+
+/// Order 3: the same where the plan goes straight on at constant speed, which takes nothing of the jerk. The rest is for the law of
+/// the approach, which comes in by whole periods.
+pub const STRAIGHT_ON_JERK_SHARE: f64 = 0.97;
+
+/// Order 3: how many times as fast an approach may end as it begins, in σ̈. Its beginning is gentle where next to nothing moves; its
+/// end is not put off for that.
+pub const APPROACH_END_FACTOR: f64 = 4.0;
+
+/// Order 3: most that σ̈ may be, as a change of the change of σ in a period, without unit: σ changes in small steps also where
+/// next to nothing moves and the limits would allow more.
+pub const MAX_RATE_CHANGE: f64 = 0.02;
+
+/// Order 3: below this share of the limits a plan goes straight on at constant speed.
+pub const STRAIGHT_ON_SHARE: f64 = 1e-3;
+
+/// Order 3: share of the jerk that braking for a place ahead counts on.
+pub const BRAKING_JERK_SHARE: f64 = 0.9;
+
+/// Order 3: fine periods at the present speed by which braking for a place ahead begins before it has to: whether it may wait is
+/// decided once in a period.
+pub const BRAKING_PERIODS: f64 = 2.0;
+
+/// Order 3: share of the path jerk that a stop at the end of a line counts on where the plan turns or changes its speed, and
+/// elsewhere.
+pub const LINE_END_JERK_SHARES: [f64; 2] = [0.6, 0.9];
+
+/// Order 3: fine periods at the present speed by which a stop at the end of a line is to end before it.
+pub const LINE_END_PERIODS: f64 = 2.0;
+
+/// Order 3: share of the path jerk that bringing the rise of the speed to nothing, near the feed, counts on: in a period in
+/// which the plan's own jerk turns round little of it is there.
+pub const RISE_JERK_SHARE: f64 = 0.8;
+
+/// Order 3: fine periods in which the speed may go on rising as it does, for the same reason.
+pub const RISE_PERIODS: f64 = 1.0;
+
+/// Order 3: most that σ̈ may be lowered to near the feed, as a change of the change of σ in a period, without unit. The small
+/// steps of other approaches are for where next to nothing moves.
+pub const MAX_LOWERING: f64 = 0.3;
+
+/// Order 3: share of the feed that is aimed at: the mean over a period may be that much higher than its ends.
+pub const FEED_SHARE: f64 = 1.0 - 1e-6;
+
+/// Order 3: how many times as far each point of the trial of rates ahead lies from the one before as that one from its own.
+/// The first lies a period away, for a plan of small features turns within a few; together they reach over 1900 periods,
+/// longer than most machines take to their feed.
+pub const FEED_POINT_SPACING: f64 = 1.12;
+
+/// Order 3: least rate for whose periods the first of those distances is taken: nearer to a rest the points would not reach far
+/// enough.
+pub const FEED_POINT_MIN_RATE: f64 = 0.02;
+
+/// Order 3: share of the limits of jerk and acceleration that the trial counts on: between the points more may be used. Of 17
+/// cases in which a feed was exceeded 0.9 leaves four, 0.8 one, by 0.001 %; of seven with sharp curves 0.8 leaves two, 0.75 one.
+pub const FEED_POINT_LIMIT_SHARE: f64 = 0.75;
+
+/// Order 3: share of the rate that all points ahead allow below which the trial does not lower it. With 1 a feed was exceeded
+/// that 0.5 keeps.
+pub const TRIAL_RATE_SHARE: f64 = 0.5;
+
+/// Order 3: fine periods from rest for which the first rate is to last: what the plan gains in fewer than these the rate could
+/// not follow.
+pub const BEGINNING_PERIODS: u32 = 6;
+
+/// Order 2: share of the speed asked for by which a period may begin above it and still end as far below, so that its mean is
+/// met. The rounds that seek the rate leave a thousandth where the plan changes by half in a period.
+pub const ABOVE_FEED_SHARE: f64 = 0.01;
+
+/// Order 2: by which share of the difference the way of the axes is taken to differ more from the path coordinate: the rate
+/// changes in the period in which it is looked at.
+pub const LONGER_MARGIN: f64 = 0.1;
+
+/// Order 2: ratio of the two ways from which on they are no fit of a polynomial: where a rotary axis hands over to a linear
+/// one, the path coordinate is in other units.
+pub const MAX_LONGER: f64 = 1.01;

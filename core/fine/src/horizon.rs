@@ -1,0 +1,163 @@
+//! Where the plan goes in the coming period and for a while after it, for segments that keep a jerk limit.
+
+use crate::governor::tuning::{
+    APPROACH_JERK_SHARE, MAX_RATE_CHANGE, STRAIGHT_ON_JERK_SHARE, STRAIGHT_ON_SHARE,
+};
+use tandem_sdk::{AxisLimits, MAX_AXES, Segment};
+
+use crate::law::stop_s;
+
+/// One point of the plan: derivatives by program time, per axis.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct HorizonPoint {
+    /// Program time from here, s.
+    pub offset_s: f64,
+    /// Velocity, mm/s.
+    pub velocity: [f64; MAX_AXES],
+    /// Acceleration, mm/s².
+    pub acceleration: [f64; MAX_AXES],
+    /// Jerk, mm/s³.
+    pub jerk: [f64; MAX_AXES],
+    /// Path jerk that the limits leave here on a straight path, mm/s³; infinite where the path stands still.
+    pub path_jerk_mm_per_s3: f64,
+}
+
+/// The points, nearest first: all ends of segments within the period, then a coarse grid.
+#[derive(Debug)]
+pub struct Horizon {
+    list: Box<[HorizonPoint]>,
+    count: usize,
+    axes: usize,
+    acceleration: [f64; MAX_AXES],
+    jerk: [f64; MAX_AXES],
+    /// How far the grid reaches, s of program time.
+    pub reach_s: f64,
+    /// Least path jerk that the limits leave on a straight path, over the points, mm/s³.
+    pub path_jerk_mm_per_s3: f64,
+    /// Bound on σ̈ that the period sets: σ changes in small steps, also where next to nothing moves, 1/s².
+    pub max_change_per_s2: f64,
+    /// Bound on σ̈ that the jerk limits leave at the plan's speed, over the points, 1/s².
+    pub rate_change_per_s2: f64,
+    /// Share of the jerk that an approach may come in with: nearly all of it where the plan goes straight on at constant speed,
+    /// else what turning and the plan's own jerk, as they change on the way, leave.
+    pub approach_jerk_share: f64,
+}
+
+impl Horizon {
+    /// Points of the grid beyond the period.
+    pub const GRID: usize = 12;
+    /// Most points.
+    const POINTS: usize = 64;
+
+    /// No points. The horizon is the longest time in which an axis changes its acceleration from none to its limit.
+    pub fn new(limits: &[AxisLimits; MAX_AXES], axes: usize, period_s: f64) -> Self {
+        let change_s = |l: &AxisLimits| l.acceleration_mm_per_s2 / l.jerk_mm_per_s3;
+        Self {
+            list: vec![HorizonPoint::default(); Self::POINTS].into_boxed_slice(),
+            count: 0,
+            axes,
+            acceleration: limits.map(|l| l.acceleration_mm_per_s2),
+            jerk: limits.map(|l| l.jerk_mm_per_s3),
+            reach_s: limits[..axes].iter().map(change_s).fold(0.0, f64::max),
+            max_change_per_s2: MAX_RATE_CHANGE / (period_s * period_s),
+            path_jerk_mm_per_s3: f64::INFINITY,
+            rate_change_per_s2: f64::INFINITY,
+            approach_jerk_share: STRAIGHT_ON_JERK_SHARE,
+        }
+    }
+
+    /// Forgets all points.
+    pub fn clear(&mut self) {
+        self.count = 0;
+        (self.path_jerk_mm_per_s3, self.rate_change_per_s2) =
+            (f64::INFINITY, self.max_change_per_s2);
+        self.approach_jerk_share = STRAIGHT_ON_JERK_SHARE;
+    }
+
+    /// Whether the points of a period have taken what room there is beside the grid.
+    pub fn is_full(&self) -> bool {
+        self.count + Self::GRID + 2 > Self::POINTS
+    }
+
+    /// Whether the plan goes straight on at constant speed.
+    pub fn is_steady(&self) -> bool {
+        self.approach_jerk_share > APPROACH_JERK_SHARE
+    }
+
+    /// The points so far.
+    pub fn iter(&self) -> impl Iterator<Item = &HorizonPoint> {
+        self.list[..self.count].iter()
+    }
+
+    /// Adds both ends of a stretch of `segment` in the coming period.
+    pub fn stretch(&mut self, segment: &Segment, from_s: f64, duration_s: f64, offset_s: f64) {
+        for (t, offset) in [
+            (from_s, offset_s),
+            (from_s + duration_s, offset_s + duration_s),
+        ] {
+            self.point(segment, t, offset);
+        }
+    }
+
+    /// Adds the point at local time `t_s` of `segment`, `offset_s` of program time from here.
+    pub fn point(&mut self, segment: &Segment, t_s: f64, offset_s: f64) {
+        let point = &mut self.list[self.count];
+        point.offset_s = offset_s;
+        let mut per_speed = f64::INFINITY;
+        for axis in 0..self.axes {
+            let [velocity, acceleration, jerk] = derivatives(&segment.coefficients[axis], t_s);
+            (
+                point.velocity[axis],
+                point.acceleration[axis],
+                point.jerk[axis],
+            ) = (velocity, acceleration, jerk);
+            per_speed = per_speed.min(self.jerk[axis] / velocity.abs());
+            let steady = acceleration.abs() < STRAIGHT_ON_SHARE * self.acceleration[axis]
+                && jerk.abs() < STRAIGHT_ON_SHARE * self.jerk[axis];
+            if !steady {
+                self.approach_jerk_share = APPROACH_JERK_SHARE;
+            }
+        }
+        let [speed, ..] = derivatives(&segment.path, t_s);
+        point.path_jerk_mm_per_s3 = if speed > 0.0 {
+            speed * per_speed
+        } else {
+            f64::INFINITY
+        };
+        if speed > 0.0 {
+            self.path_jerk_mm_per_s3 = self.path_jerk_mm_per_s3.min(speed * per_speed);
+            self.rate_change_per_s2 = self.rate_change_per_s2.min(per_speed);
+        }
+        self.count += 1;
+    }
+
+    /// The least path jerk of the points that are passed before a stop with it comes to rest, mm/s³: from the rate `sigma`, and
+    /// from `speed`, mm/s, and `acceleration`, mm/s², along the path. What lies beyond does not matter: where an axis turns much
+    /// on little path it is next to nothing.
+    pub fn path_jerk_to_rest(&self, sigma: f64, speed: f64, acceleration: f64) -> f64 {
+        let mut least = f64::INFINITY;
+        for point in self.iter() {
+            if least.is_finite()
+                && point.offset_s > sigma * stop_s(speed, acceleration, f64::INFINITY, least)
+            {
+                break;
+            }
+            least = least.min(point.path_jerk_mm_per_s3);
+        }
+        least
+    }
+
+    /// Per axis: its number, and its limits of acceleration, mm/s², and jerk, mm/s³.
+    pub fn limits(&self) -> impl Iterator<Item = (usize, (f64, f64))> {
+        (0..self.axes).map(|axis| (axis, (self.acceleration[axis], self.jerk[axis])))
+    }
+}
+
+/// First, second and third derivative at `t` of the polynomial `c`.
+pub fn derivatives(c: &[f64; 6], t: f64) -> [f64; 3] {
+    [
+        c[1] + t * (2.0 * c[2] + t * (3.0 * c[3] + t * (4.0 * c[4] + t * 5.0 * c[5]))),
+        2.0 * c[2] + t * (6.0 * c[3] + t * (12.0 * c[4] + t * 20.0 * c[5])),
+        6.0 * c[3] + t * (24.0 * c[4] + t * 60.0 * c[5]),
+    ]
+}

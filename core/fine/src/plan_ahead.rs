@@ -1,0 +1,258 @@
+//! The plan ahead as it is queued, at any place: changes of σ are tried on it before they are begun.
+
+use tandem_rings::Queued;
+use tandem_sdk::{MAX_AXES, Segment, SegmentFlags};
+
+use crate::horizon::derivatives;
+use crate::steps::Steps;
+
+/// The plan from here on: the segment that moves, and what is queued behind it.
+#[derive(Clone, Copy, Debug)]
+pub struct PlanAhead<'a> {
+    segment: &'a Segment,
+    queued: [&'a [Queued]; 2],
+    axes: usize,
+    linear: u32,
+}
+
+/// Where the plan is on its path, and how fast.
+#[derive(Clone, Copy, Debug)]
+pub struct Pace {
+    /// Path coordinate, mm.
+    pub path_mm: f64,
+    /// Position of the linear axes, mm; zero for the others.
+    pub linear_mm: [f64; MAX_AXES],
+    /// Path speed, mm/s of program time.
+    pub speed: f64,
+    /// Its rate of change, mm/s².
+    pub rise: f64,
+}
+
+impl Pace {
+    /// How far it is to `other`, mm: on the path, or straight on, whichever is more.
+    pub fn way_to_mm(&self, other: &Self) -> f64 {
+        let squares = self
+            .linear_mm
+            .iter()
+            .zip(&other.linear_mm)
+            .map(|(a, b)| (b - a) * (b - a));
+        squares
+            .sum::<f64>()
+            .sqrt()
+            .max(other.path_mm - self.path_mm)
+    }
+}
+
+/// Derivatives of the plan at a place by program time, per axis.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Motion {
+    /// Velocity, mm/s.
+    pub velocity: [f64; MAX_AXES],
+    /// Acceleration, mm/s².
+    pub acceleration: [f64; MAX_AXES],
+    /// Jerk, mm/s³.
+    pub jerk: [f64; MAX_AXES],
+}
+
+impl Motion {
+    /// That of `segment` at local time `local_s`, for its first `axes` axes; others stay as they are.
+    fn look_at(&mut self, segment: &Segment, local_s: f64, axes: usize) {
+        for axis in 0..axes {
+            let [velocity, acceleration, jerk] = derivatives(&segment.coefficients[axis], local_s);
+            (
+                self.velocity[axis],
+                self.acceleration[axis],
+                self.jerk[axis],
+            ) = (velocity, acceleration, jerk);
+        }
+    }
+}
+
+/// A place on a [`PlanAhead`].
+#[derive(Clone, Copy, Debug)]
+pub struct PlanCursor<'a> {
+    plan: PlanAhead<'a>,
+    /// The segment here; none after a rest and after what is queued, where nothing moves.
+    segment: Option<&'a Segment>,
+    /// Entries passed.
+    passed: usize,
+    local_s: f64,
+    /// The place lies within what is queued, or at a rest that ends it.
+    known: bool,
+}
+
+impl<'a> PlanAhead<'a> {
+    /// `segment` moves, `queued` follows; `axes` axes are looked at, those of the mask `linear` are linear ones.
+    pub fn new(
+        segment: &'a Segment,
+        queued: [&'a [Queued]; 2],
+        (axes, linear): (usize, u32),
+    ) -> Self {
+        Self {
+            segment,
+            queued,
+            axes,
+            linear,
+        }
+    }
+
+    /// The place at local time `local_s` of the segment that moves.
+    pub fn begin(&self, local_s: f64) -> PlanCursor<'a> {
+        PlanCursor {
+            plan: *self,
+            segment: Some(self.segment),
+            passed: 0,
+            local_s,
+            known: true,
+        }
+    }
+
+    fn entry(&self, n: usize) -> Option<&'a Queued> {
+        let [first, second] = self.queued;
+        first.get(n).or_else(|| second.get(n - first.len()))
+    }
+}
+
+impl<'a> PlanCursor<'a> {
+    /// The segment here and the time in it, s; `None` where nothing moves.
+    pub fn segment(&self) -> Option<(&'a Segment, f64)> {
+        self.segment.map(|segment| (segment, self.local_s))
+    }
+
+    /// How the plan moves here.
+    pub fn motion(&self) -> Motion {
+        let mut motion = Motion::default();
+        if let Some(segment) = self.segment {
+            motion.look_at(segment, self.local_s, self.plan.axes);
+        }
+        motion
+    }
+
+    /// Writes to `motion` how the plan moves here, and gives how fast on its path, as [`PlanCursor::pace`] has it; `None` where nothing
+    /// moves.
+    pub fn look_at_motion(&self, motion: &mut Motion) -> Option<f64> {
+        let segment = self.segment?;
+        let [speed, ..] = derivatives(&segment.path, self.local_s);
+        motion.look_at(segment, self.local_s, self.plan.axes);
+        let mut squares = 0.0;
+        for axis in (0..self.plan.axes).filter(|axis| self.plan.linear >> axis & 1 == 1) {
+            squares += motion.velocity[axis] * motion.velocity[axis];
+        }
+        Some(if squares > speed * speed {
+            f64::sqrt(squares)
+        } else {
+            speed
+        })
+    }
+
+    /// Where the plan is on its path here, per s of program time; `None` where nothing moves.
+    ///
+    /// The path coordinate of a planner is a polynomial of its own, which may fall short of the way that the axes drive: the
+    /// greater speed counts.
+    pub fn pace(&self) -> Option<Pace> {
+        let segment = self.segment?;
+        let [speed, rise, _] = derivatives(&segment.path, self.local_s);
+        let mut pace = Pace {
+            path_mm: segment.path_mm(self.local_s),
+            linear_mm: [0.0; MAX_AXES],
+            speed,
+            rise,
+        };
+        let (mut squares, mut product) = (0.0, 0.0);
+        let position = segment.position(self.local_s);
+        for axis in (0..self.plan.axes).filter(|axis| self.plan.linear >> axis & 1 == 1) {
+            let [velocity, acceleration, _] =
+                derivatives(&segment.coefficients[axis], self.local_s);
+            pace.linear_mm[axis] = position[axis];
+            (squares, product) = (
+                squares + velocity * velocity,
+                product + velocity * acceleration,
+            );
+        }
+        if squares > speed * speed {
+            (pace.speed, pace.rise) = (squares.sqrt(), product / squares.sqrt());
+        }
+        Some(pace)
+    }
+
+    /// Programmed feed here, mm/s; infinite in a rapid, and where nothing moves.
+    pub fn feed_mm_per_s(&self) -> f64 {
+        self.segment
+            .filter(|it| !it.flags.contains(SegmentFlags::RAPID))
+            .map_or(f64::INFINITY, |it| it.feed_mm_per_s)
+    }
+
+    /// Moves on by `time_s`, over the ends of segments.
+    pub fn go(&mut self, time_s: f64) {
+        let mut left_s = self.advance(time_s);
+        while left_s > 0.0 && self.segment.is_some() {
+            self.step();
+            left_s = self.advance(left_s);
+        }
+    }
+
+    /// Whether what follows the place is known: `false` beyond what is queued, unless that ends at rest.
+    pub fn is_known(&self) -> bool {
+        self.known
+    }
+
+    /// How much of `max_s` lies in the segment here, s; all of it where nothing moves.
+    pub fn stretch_s(&self, max_s: f64) -> f64 {
+        self.segment.map_or(max_s, |segment| {
+            (segment.duration_s - self.local_s).clamp(0.0, max_s)
+        })
+    }
+
+    /// Moves on to the end of the segment, and by no more than `max_s`; gives what is left of it.
+    pub fn advance(&mut self, max_s: f64) -> f64 {
+        let Some(segment) = self.segment else {
+            return 0.0;
+        };
+        let left_s = segment.duration_s - self.local_s;
+        self.local_s += left_s.min(max_s);
+        (max_s - left_s).max(0.0)
+    }
+
+    /// From the end of a segment to the start of the next one that moves; gives what steps there.
+    pub fn step(&mut self) -> Option<Steps> {
+        let before = self.segment;
+        let mut rests = self.segment.is_none_or(ends);
+        self.segment = None;
+        while !rests && self.segment.is_none() {
+            match self.plan.entry(self.passed) {
+                Some(Queued::Segment { segment, .. }) if segment.duration_s == 0.0 => {
+                    rests = ends(segment);
+                }
+                Some(Queued::Segment { segment, .. }) => self.segment = Some(segment),
+                Some(Queued::Event(_)) => {}
+                None => (rests, self.known) = (true, false),
+            }
+            self.passed += 1;
+        }
+        self.local_s = 0.0;
+        match (before, self.segment) {
+            // A plan made of samples may come to rest with some acceleration left.
+            (Some(before), None) if self.known => Some(Steps::to_rest(before)),
+            (Some(before), Some(behind)) if behind.flags.contains(SegmentFlags::STEPS) => {
+                Some(Steps::between(before, behind))
+            }
+            _ => None,
+        }
+    }
+
+    /// What steps within `horizon_s` from here.
+    pub fn steps_within(mut self, horizon_s: f64) -> Steps {
+        let (mut steps, mut left_s) = (Steps::default(), self.advance(horizon_s));
+        while left_s > 0.0 && self.segment.is_some() {
+            if let Some(more) = self.step() {
+                steps.join(&more);
+            }
+            left_s = self.advance(left_s);
+        }
+        steps
+    }
+}
+
+fn ends(segment: &Segment) -> bool {
+    segment.flags.contains(SegmentFlags::ENDS_AT_REST)
+}

@@ -1,0 +1,231 @@
+//! What lies ahead on the path that the plan does not slow down for by itself: a lower feed at a ratio below 1, and the
+//! end of a line in single-block operation.
+//!
+//! The queue is looked at once, a bounded number of entries in a period, ahead of the place that moves.
+
+use tandem_rings::{MAX_ENTRIES, Queued};
+use tandem_sdk::{Segment, SegmentFlags};
+
+use crate::cursor::Cursor;
+
+/// A place on the path from which on the programmed feed is lower.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Slowdown {
+    /// Path coordinate, mm.
+    pub path_mm: f64,
+    /// Programmed feed from there, mm/s.
+    pub feed_mm_per_s: f64,
+    /// Planned path speed there, mm/s.
+    pub speed_mm_per_s: f64,
+    /// Path acceleration planned from there on, mm/s².
+    pub acceleration_mm_per_s2: f64,
+}
+
+impl Slowdown {
+    /// The speed to arrive with, mm/s, where `ratio` of the feed is asked for. A corner, which the plan leaves getting
+    /// faster, lies inside a period in which the governor cannot yet take that back: its rise is left out, up to the half.
+    pub fn speed_to_meet_mm_per_s(&self, ratio: f64, period_s: f64) -> f64 {
+        let asked = ratio * self.feed_mm_per_s;
+        let sigma = if self.speed_mm_per_s > asked {
+            asked / self.speed_mm_per_s
+        } else {
+            1.0
+        };
+        let rise = sigma * sigma * self.acceleration_mm_per_s2.max(0.0) * period_s;
+        (asked - rise).max(asked / 2.0)
+    }
+}
+
+/// Entries looked at in a period: more than may be driven in one.
+const ENTRIES: usize = 2 * MAX_ENTRIES;
+/// Most marks; where there are more, neighbours are merged to the earlier place and the lower feed.
+const MARKS: usize = 64;
+
+/// The marks ahead.
+#[derive(Debug)]
+pub struct Slowdowns {
+    /// Number of the entry to look at next.
+    next: u64,
+    /// Programmed feed up to there, mm/s.
+    feed_mm_per_s: f64,
+    marks: Box<[Slowdown]>,
+    first: usize,
+    count: usize,
+}
+
+impl Slowdowns {
+    /// Nothing seen. Allocates.
+    pub fn new() -> Self {
+        Self {
+            next: 0,
+            feed_mm_per_s: 0.0,
+            marks: vec![Slowdown::default(); MARKS].into_boxed_slice(),
+            first: 0,
+            count: 0,
+        }
+    }
+
+    /// Looks further ahead, up to program time `until_s`; forgets what has been passed.
+    pub fn extend(&mut self, cursor: &mut Cursor, until_s: f64) {
+        let here_mm = cursor.path_mm();
+        if self.next < cursor.next_number() {
+            // At a rest the feed before it says nothing of what follows.
+            let rests = cursor.segment().flags.contains(SegmentFlags::ENDS_AT_REST);
+            let before = cursor.segment().feed_mm_per_s;
+            (self.next, self.feed_mm_per_s) =
+                (cursor.next_number(), if rests { 0.0 } else { before });
+        }
+        while self.count > 0 && self.marks[self.first].path_mm <= here_mm {
+            self.first = (self.first + 1) % MARKS;
+            self.count -= 1;
+        }
+        self.next = cursor.walk(self.next, ENTRIES, |queued| {
+            if let Queued::Segment { start_s, segment } = queued {
+                if *start_s > until_s {
+                    return false;
+                }
+                self.see(segment);
+            }
+            true
+        });
+    }
+
+    /// Forgets the marks: what is queued counts no more.
+    pub fn clear(&mut self) {
+        self.count = 0;
+    }
+
+    /// The marks ahead, nearest first.
+    pub fn marks(&self) -> impl Iterator<Item = &Slowdown> {
+        (0..self.count).map(|n| &self.marks[(self.first + n) % MARKS])
+    }
+
+    fn see(&mut self, segment: &Segment) {
+        let moves = !segment.flags.contains(SegmentFlags::DWELL) && segment.duration_s > 0.0;
+        if moves && segment.feed_mm_per_s < self.feed_mm_per_s {
+            self.mark(Slowdown {
+                path_mm: segment.path[0],
+                feed_mm_per_s: segment.feed_mm_per_s,
+                speed_mm_per_s: segment.path[1],
+                acceleration_mm_per_s2: 2.0 * segment.path[2],
+            });
+        }
+        if segment.flags.contains(SegmentFlags::ENDS_AT_REST) {
+            // A feed behind a rest is met from nothing; and it may be one of rotary axes, in other units.
+            self.feed_mm_per_s = 0.0;
+        } else if moves {
+            self.feed_mm_per_s = segment.feed_mm_per_s;
+        }
+    }
+
+    fn mark(&mut self, mark: Slowdown) {
+        if self.count < MARKS {
+            self.marks[(self.first + self.count) % MARKS] = mark;
+            self.count += 1;
+        } else {
+            let last = &mut self.marks[(self.first + self.count - 1) % MARKS];
+            last.feed_mm_per_s = last.feed_mm_per_s.min(mark.feed_mm_per_s);
+            last.speed_mm_per_s = last.speed_mm_per_s.min(mark.speed_mm_per_s);
+            last.acceleration_mm_per_s2 =
+                last.acceleration_mm_per_s2.max(mark.acceleration_mm_per_s2);
+        }
+    }
+}
+
+/// Where single-block operation stops next.
+#[derive(Debug, Default)]
+pub struct LineEnd {
+    /// Number of the entry to look at next.
+    next: u64,
+    /// Line of the entries up to there.
+    line: u32,
+    /// Whether the plan rests there by itself.
+    rests: bool,
+    /// Path coordinate of the end chosen, mm.
+    chosen_mm: Option<f64>,
+}
+
+impl LineEnd {
+    /// Forgets the end chosen: the next one is looked for.
+    pub fn forget(&mut self) {
+        self.chosen_mm = None;
+    }
+
+    /// Whether the end chosen lies behind the machine, which did not come to rest there.
+    pub fn is_passed(&self, cursor: &Cursor) -> bool {
+        self.chosen_mm
+            .is_some_and(|end_mm| end_mm < cursor.path_mm())
+    }
+
+    /// The nearest end of a line at which the plan goes on and the machine can stop when it needs `way_mm` for it.
+    pub fn look(&mut self, cursor: &mut Cursor, way_mm: f64) -> Option<f64> {
+        let here_mm = cursor.path_mm();
+        if self.chosen_mm.is_none_or(|end_mm| end_mm < here_mm) {
+            self.chosen_mm = None;
+            let overtaken = self.next < cursor.next_number();
+            if overtaken {
+                (self.next, self.line) = (cursor.next_number(), cursor.segment().line);
+            }
+            let nearest_mm = here_mm + way_mm;
+            let (line, rests, chosen) = (&mut self.line, &mut self.rests, &mut self.chosen_mm);
+            self.next = cursor.walk(self.next, ENTRIES, |queued| {
+                let Queued::Segment { segment, .. } = queued else {
+                    return true;
+                };
+                let ended = segment.line != *line && !*rests && segment.path[0] >= nearest_mm;
+                (*line, *rests) = (
+                    segment.line,
+                    segment.flags.contains(SegmentFlags::ENDS_AT_REST),
+                );
+                *chosen = ended.then_some(segment.path[0]);
+                !ended
+            });
+        }
+        self.chosen_mm
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rtrb::RingBuffer;
+    use tandem_sdk::AxisVector;
+
+    /// The marks ahead of a place at rest behind which feeds follow; `true` where the segment ends at rest.
+    fn marks(feeds: &[(f64, bool)]) -> Vec<(f64, f64)> {
+        let (mut input, output) = RingBuffer::new(16);
+        let mut path_mm = 0.0;
+        for (feed_mm_per_s, rests) in feeds {
+            let mut segment = Segment::rest(&AxisVector::ZERO, 1.0);
+            segment.flags = if *rests {
+                SegmentFlags::ENDS_AT_REST
+            } else {
+                SegmentFlags::default()
+            };
+            segment.feed_mm_per_s = *feed_mm_per_s;
+            segment.path = [path_mm, *feed_mm_per_s, 0.0, 0.0, 0.0, 0.0];
+            path_mm += feed_mm_per_s;
+            let start_s = 0.0;
+            input.push(Queued::Segment { start_s, segment }).unwrap();
+        }
+        let mut cursor = Cursor::new(output, &AxisVector::ZERO);
+        let mut slowdowns = Slowdowns::new();
+        slowdowns.extend(&mut cursor, 10.0);
+        slowdowns
+            .marks()
+            .map(|mark| (mark.path_mm, mark.feed_mm_per_s))
+            .collect()
+    }
+
+    /// A rotary axis may follow there, whose feed is in rad/s: a line before it was driven at that many mm/s.
+    #[test]
+    fn a_lower_feed_behind_a_rest_is_nothing_to_slow_down_for() {
+        assert_eq!(marks(&[(5.0, false), (2.0, false)]), [(5.0, 2.0)]);
+        assert_eq!(marks(&[(5.0, true), (2.0, false)]), []);
+        assert_eq!(
+            marks(&[(5.0, true), (2.0, false), (1.0, true), (0.5, false)]),
+            [(7.0, 1.0)]
+        );
+        assert_eq!(marks(&[(2.0, false), (5.0, false)]), []);
+    }
+}

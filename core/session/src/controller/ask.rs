@@ -1,0 +1,399 @@
+//! What clients ask for: judged by the state of the machine, and done or ordered of the loop that drives.
+//!
+//! Nothing is locked while a disk is waited for, so that whoever stops the machine, or looks at it, waits for no disk of another's.
+
+use std::sync::{MutexGuard, PoisonError};
+
+use serde_json::{Value, json};
+use tandem_host::Command;
+
+use super::described;
+use super::desk::{Answered, Books, Desk, From, Inner, Loaded, Mode, Order};
+use super::history::HELD;
+use super::lines::{TakenLine, lock};
+use super::programs::{Upload, discard};
+use super::request::Asked;
+use super::states::{ControllerState, judge};
+use super::words::word_of;
+use crate::jog::{JogMessage, ReachMessage};
+
+/// Why what came before a stop is not begun behind it.
+pub const STOPPED: &str = "the machine was stopped before this was begun: ask again";
+
+impl Desk {
+    /// Whether an answer waits for a disk.
+    pub fn waits_for_disk(&self, asked: &Asked) -> bool {
+        match asked.name() {
+            "mdi" => asked
+                .text("line")
+                .is_ok_and(|line| lock(&self.lines).calls(line)),
+            name => [
+                "list",
+                "upload",
+                "acknowledge",
+                "load",
+                "check",
+                "touch-off",
+                "set-offset",
+                "set-tool",
+                "set-parameter",
+            ]
+            .contains(&name),
+        }
+    }
+
+    /// So many stops were asked for.
+    pub fn stops(&self) -> u64 {
+        self.lock().stops
+    }
+
+    /// Judges a request by the state of the machine, and does it or orders it. May wait for a disk, where
+    /// [`Desk::waits_for_disk`] says so.
+    pub fn ask(&self, from: From, asked: &Asked) -> Answered {
+        self.ask_since(from, asked, self.stops())
+    }
+
+    /// The same for a request that came when so many stops had been asked for: behind a later one it moves nothing.
+    pub fn ask_since(&self, from: From, asked: &Asked, stops: u64) -> Answered {
+        let name = asked.name();
+        let done = match name {
+            "list" | "upload" | "acknowledge" => {
+                fits(self.state(), asked, name).and_then(|()| match name {
+                    "list" => self.list(),
+                    "upload" => self.upload(from, asked, &mut self.pending()),
+                    _ => self.acknowledge(asked),
+                })
+            }
+            "touch-off" | "set-offset" | "set-tool" | "set-parameter" => {
+                self.change(asked, name, stops)
+            }
+            "mdi" if self.waits_for_disk(asked) => self.call(from, asked, stops),
+            "load" | "check" => {
+                let read = fits(self.state(), asked, name).and_then(|()| self.program_of(asked));
+                return match read {
+                    Ok(program) => self.ask_now(from, asked, stops, Some(program)),
+                    Err(why) => Some(Err(why)),
+                };
+            }
+            _ => return self.ask_now(from, asked, stops, None),
+        };
+        Some(done)
+    }
+
+    /// What waits for nothing.
+    fn ask_now(&self, from: From, asked: &Asked, stops: u64, program: Option<Loaded>) -> Answered {
+        let name = asked.name();
+        let mut inner = self.lock();
+        if let Err(why) = self.may(&inner, asked, name, stops) {
+            return Some(Err(why));
+        }
+        let order = match self.act(from, asked, name, program, &mut inner) {
+            Ok(Acted::Done(value)) => return Some(Ok(value)),
+            Err(why) => return Some(Err(why)),
+            Ok(Acted::Begins(order, value)) => (order, Some(Ok(value))),
+            Ok(Acted::Ordered(order)) => (order, None),
+        };
+        inner.order = Some(order.0);
+        order.1
+    }
+
+    /// Whether a request can be granted now.
+    fn may(&self, inner: &Inner, asked: &Asked, name: &str, stops: u64) -> Result<(), String> {
+        fits(self.state_of(inner), asked, name)?;
+        if inner.stops != stops && moves(name) {
+            return Err(STOPPED.to_string());
+        }
+        let joins = matches!(
+            (&inner.order, name),
+            (Some(Order::Mdi), "mdi") | (Some(Order::Jog), "jog" | "jog-stop")
+        );
+        if (inner.books == Books::Written || inner.order.is_some() && !joins)
+            && begins_or_sets(name)
+        {
+            return Err("another request is being begun: wait for its answer".to_string());
+        }
+        Ok(())
+    }
+
+    /// Changes what lasts, while nothing else is begun.
+    fn change(&self, asked: &Asked, name: &str, stops: u64) -> Result<Value, String> {
+        let mut inner = self.lock();
+        self.may(&inner, asked, name, stops)?;
+        inner.books = Books::Written;
+        drop(inner);
+        let set = self.set(asked, name);
+        self.lock().books = Books::Closed;
+        set
+    }
+
+    /// Judges a line that calls a subroutine, and takes it. Where something has come meanwhile it is judged once more behind that.
+    fn call(&self, from: From, asked: &Asked, stops: u64) -> Result<Value, String> {
+        let (text, files) = (asked.text("line")?, lock(&self.lines).files());
+        loop {
+            let inner = self.lock();
+            self.may(&inner, asked, "mdi", stops)?;
+            let begun = lock(&self.lines).begin_call();
+            drop(inner);
+            let call = begun.map_err(|why| why.to_string())?;
+            let judged = call.judge(&files, text).map_err(|why| why.to_string())?;
+            let mut inner = self.lock();
+            self.may(&inner, asked, "mdi", stops)?;
+            let taken = lock(&self.lines).end_call((from.client, from.id), &call, judged);
+            let Some(taken) = taken else { continue };
+            let taken = taken.map_err(|why| why.to_string())?;
+            if Self::begins_lines(&inner, taken) {
+                inner.order = Some(Order::Mdi);
+            }
+            return Ok(json!({ "judged": true }));
+        }
+    }
+
+    /// Whether a job is to be ordered for a line that was taken.
+    fn begins_lines(inner: &Inner, taken: TakenLine) -> bool {
+        inner.mode != Mode::Mdi && inner.order.is_none() && taken.begins
+    }
+
+    /// A client is gone, and what it was bringing with it. May wait for a disk.
+    pub fn forget_upload(&self, client: u64) {
+        let mut pending = self.pending();
+        if pending.as_ref().is_some_and(|upload| upload.is_by(client)) {
+            discard(&mut pending);
+        }
+    }
+
+    /// The program that is on its way into the folder.
+    fn pending(&self) -> MutexGuard<'_, Option<Upload>> {
+        self.upload.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn act(
+        &self,
+        from: From,
+        asked: &Asked,
+        name: &str,
+        program: Option<Loaded>,
+        inner: &mut Inner,
+    ) -> Result<Acted, String> {
+        let give = |command: Command| {
+            self.hub
+                .give(command)
+                .map(|tick| Acted::Done(json!({ "tick": tick })))
+        };
+        match name {
+            "status" => Ok(Acted::Done(self.status_of(inner))),
+            "history" => {
+                let count = asked.whole_if_any("count").unwrap_or(HELD as u64);
+                Ok(Acted::Done(inner.history.show(count as usize)))
+            }
+            "alarms" => Ok(Acted::Done(
+                json!({ "alarms": inner.history.open_alarms() }),
+            )),
+            "machine" => Ok(Acted::Done(described::machine(&self.machine))),
+            "tables" => {
+                let lasting = lock(&self.lines).standing().lasting();
+                Ok(Acted::Done(described::tables(&self.machine, &lasting)))
+            }
+            "path" => {
+                let number = |key: &str| asked.whole_if_any(key).unwrap_or(0);
+                let (from, driven_from) = (number("from"), number("driven_from"));
+                Ok(Acted::Done(if asked.is_on("packed") {
+                    self.path().show_packed(from, driven_from)
+                } else {
+                    self.path().show(from, driven_from)
+                }))
+            }
+            "scope" => self.scope().watch(from.client, asked).map(Acted::Done),
+            "capture" => self.scope().arm(from.client, asked).map(Acted::Done),
+            "captured" => {
+                let first = asked.whole_if_any("from").unwrap_or(0) as usize;
+                self.scope().captured(from.client, first).map(Acted::Done)
+            }
+            "policy-parameters" => Ok(Acted::Done(
+                json!({ "parameters": inner.policy_parameters, "declared": inner.declared_parameters }),
+            )),
+            "set-policy-parameter" => Ok(Acted::Ordered(Order::SetPolicyParameter {
+                from,
+                name: asked.text("name")?.to_string(),
+                value: asked.number("value")?,
+            })),
+            "hold" => give(Command::Hold),
+            "resume" => give(Command::Resume),
+            "emergency-stop" => {
+                inner.stops += 1;
+                give(Command::EmergencyStop)
+            }
+            "abort" => {
+                let done = if inner.is_about_to_move() {
+                    Acted::Done(json!({ "tick": self.hub.now() }))
+                } else {
+                    give(Command::Abort)?
+                };
+                inner.aborting = true;
+                inner.stops += 1;
+                self.jogs.forget();
+                Ok(done)
+            }
+            "feed-override" => asked
+                .number("ratio")
+                .and_then(ratio)
+                .and_then(|r| give(Command::FeedOverride(r))),
+            "rapid-override" => asked
+                .number("ratio")
+                .and_then(ratio)
+                .and_then(|r| give(Command::RapidOverride(r))),
+            "single-block" => give(Command::SingleBlock(asked.on()?)),
+            "optional-stop" => give(Command::OptionalStop(asked.on()?)),
+            "block-delete" => {
+                inner.block_delete = asked.on()?;
+                Ok(Acted::Done(json!({ "block_delete": inner.block_delete })))
+            }
+            "load" | "check" => {
+                let program = program.ok_or("the program was not read")?;
+                Ok(Acted::Ordered(Order::Check {
+                    from,
+                    program,
+                    load: name == "load",
+                }))
+            }
+            "start" => {
+                let missing = "no program is loaded: \"load\" loads one";
+                inner
+                    .loaded
+                    .as_ref()
+                    .map(|_| Acted::Ordered(Order::Start { from }))
+                    .ok_or_else(|| missing.to_string())
+            }
+            "mdi" => {
+                let taken = lock(&self.lines)
+                    .judge(from.client, from.id, asked.text("line")?)
+                    .map_err(|why| why.to_string())?;
+                let judged = json!({ "judged": true });
+                Ok(if Self::begins_lines(inner, taken) {
+                    Acted::Begins(Order::Mdi, judged)
+                } else {
+                    Acted::Done(judged)
+                })
+            }
+            "jog-stop" => {
+                self.jogs.let_go();
+                Ok(Acted::Done(json!({ "jog": "stop" })))
+            }
+            "jog" => {
+                let jog = jog(asked)?.on(&self.machine.axes)?;
+                if asked.is_on("again") {
+                    self.jogs.keep_alive(jog)?;
+                    return Ok(Acted::Done(json!({ "jog": asked.with.get("axis") })));
+                }
+                self.jogs.ask(jog)?;
+                let done = json!({ "jog": asked.with.get("axis") });
+                let waits = inner.mode == Mode::Jog || inner.order.is_some();
+                Ok(if waits {
+                    Acted::Done(done)
+                } else {
+                    Acted::Begins(Order::Jog, done)
+                })
+            }
+            "home" => {
+                let axis = asked.text_if_any("axis").map(|axis| self.axis(axis));
+                Ok(Acted::Ordered(Order::Home {
+                    from,
+                    axis: axis.transpose()?,
+                }))
+            }
+            "reset" => Ok(Acted::Ordered(Order::Enable { from, resets: true })),
+            "enable" => Ok(Acted::Ordered(Order::Enable {
+                from,
+                resets: false,
+            })),
+            "disable" => Ok(Acted::Ordered(Order::Disable { from })),
+            other => Err(format!("{other} is not done here")),
+        }
+    }
+
+    fn axis(&self, letter: &str) -> Result<usize, String> {
+        let mut letters = letter.chars();
+        let one = letters
+            .next()
+            .filter(|_| letters.next().is_none())
+            .map(|letter| letter.to_ascii_uppercase());
+        one.and_then(|one| self.machine.axes.index(one))
+            .ok_or_else(|| format!("the machine has no axis {letter}"))
+    }
+}
+
+/// What became of a request that was granted.
+enum Acted {
+    /// Done, with the answer.
+    Done(Value),
+    /// Done, and a job begins for it.
+    Begins(Order, Value),
+    /// The loop that drives answers.
+    Ordered(Order),
+}
+
+/// Whether a request fits the state, and has the keys that its word asks for.
+fn fits(state: ControllerState, asked: &Asked, name: &str) -> Result<(), String> {
+    judge(state, name)?;
+    word_of(name).map_or(Ok(()), |word| word.check(&asked.with))
+}
+
+/// Whether something may move behind it, that a stop was to prevent.
+fn moves(name: &str) -> bool {
+    ["start", "mdi", "jog", "home", "resume", "reset", "enable"].contains(&name)
+}
+
+/// Whether a request begins a job or changes what one begins with: one at a time.
+fn begins_or_sets(name: &str) -> bool {
+    [
+        "load",
+        "check",
+        "start",
+        "mdi",
+        "jog",
+        "home",
+        "reset",
+        "enable",
+        "disable",
+        "touch-off",
+        "set-offset",
+        "set-tool",
+        "set-parameter",
+        "set-policy-parameter",
+        "resume",
+    ]
+    .contains(&name)
+}
+
+fn ratio(value: f64) -> Result<f64, String> {
+    if value.is_finite() && value >= 0.0 {
+        Ok(value)
+    } else {
+        Err(format!("{value} is not a number of zero or more"))
+    }
+}
+
+/// A jog as clients ask for it.
+fn jog(asked: &Asked) -> Result<JogMessage, String> {
+    let axis = asked
+        .text("axis")?
+        .chars()
+        .next()
+        .ok_or("jog needs an axis")?;
+    let degrees = asked.with.contains_key("feed_deg_per_min");
+    let unit = if degrees { "deg" } else { "mm" };
+    let feed_per_min = asked.number(&format!("feed_{unit}_per_min"))?;
+    let distance = asked.number_if_any(&format!("distance_{unit}"))?;
+    let reach = match (distance, asked.number_if_any("direction")?) {
+        (Some(distance), None) => ReachMessage::By(distance),
+        (None, Some(direction)) if direction.abs() == 1.0 => ReachMessage::On {
+            positive: direction > 0.0,
+        },
+        _ => return Err("jog needs one of distance and direction (1 or -1)".to_string()),
+    };
+    Ok(JogMessage {
+        axis,
+        reach,
+        feed_per_min,
+        degrees: Some(degrees),
+    })
+}

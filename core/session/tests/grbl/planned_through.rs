@@ -1,0 +1,58 @@
+//! A sender that is faster than the machine, but not by much: its lines are planned through from the first on, without a rest between
+//! them.
+
+use tandem_oracle::{Row, Trace};
+use tandem_rig::Random;
+
+use crate::speak::{Streamer, alone_s, chords, jobs, machine, serve_recorded};
+
+/// Times at which the machine slows down to a tenth of its feed between the first and the last motion, s.
+fn slow_s(trace: &Trace, feed_mm_per_s: f64) -> Vec<f64> {
+    let speed = |pair: &[Row]| {
+        let squares = pair[0].command.iter().zip(&pair[1].command);
+        let square: f64 = squares.map(|(from, to)| (to - from).powi(2)).sum();
+        square.sqrt() / (pair[1].t_s - pair[0].t_s)
+    };
+    let speeds: Vec<f64> = trace.rows.windows(2).map(speed).collect();
+    let is_fast = |speed: &f64| *speed > feed_mm_per_s / 10.0;
+    let first = speeds.iter().position(is_fast).unwrap();
+    let last = speeds.iter().rposition(is_fast).unwrap();
+    let slow = (first..last).filter(|at| is_fast(&speeds[*at]) && !is_fast(&speeds[at + 1]));
+    slow.map(|at| trace.rows[at].t_s).collect()
+}
+
+#[test]
+fn a_sender_that_never_fills_the_planner_makes_no_rests() {
+    let seed = std::env::var("TANDEM_SEED").map_or(1, |seed| seed.parse().unwrap());
+    println!("TANDEM_SEED={seed}");
+    let mut random = Random::new(seed);
+    let all = chords(2000);
+    let lines: Vec<String> = all
+        .lines()
+        .take(400)
+        .map(|line| format!("{line}\n"))
+        .collect();
+    let text = lines.concat();
+    let machine = machine("mill-3axis.toml", &[]);
+    let alone_s = alone_s(&machine, &text);
+    // 100 lines are driven in a second; six fit in 127 bytes.
+    let every = 5 + random.below(26);
+    let (mut streamer, seen) = Streamer::new(&text, 127, 200, 1);
+    streamer.every = every;
+    let folder = tempfile::tempdir().unwrap();
+    let told = serve_recorded(&machine, vec![streamer], vec![], Some(folder.path()));
+    assert_eq!(seen.lock().unwrap().errors, [""; 0]);
+    let jobs = jobs(&told);
+    assert_eq!(jobs.len(), 1, "{jobs:?}");
+    let trace = Trace::read(&folder.path().join("000001-mdi/trace.csv")).unwrap();
+    let slow_s = slow_s(&trace, 50.0);
+    assert!(
+        slow_s.is_empty(),
+        "lines every {every} ms: it slows down at {slow_s:?} s"
+    );
+    let ratio = jobs[0]["time_s"].as_f64().unwrap() / alone_s;
+    assert!(
+        ratio <= 1.05,
+        "lines every {every} ms: {ratio} of the run's time"
+    );
+}
