@@ -299,22 +299,37 @@ impl Server {
         .await
     }
 
-    /// Records a result of the worker called `by` as the first or the second of its job; a third tells nothing more.
+    /// Records a result of the worker called `by` as the first or the second of its job; a third tells nothing more. `asked_again`
+    /// says that the job was handed out to be done a second time.
     ///
     /// # Errors
-    /// The server is away for too long.
-    pub(crate) async fn record(&self, result: &JobResult, by: &str) -> Result<(), String> {
+    /// The server is away for too long, or holds what is no result.
+    pub(crate) async fn record(
+        &self,
+        results: &Stream,
+        result: &JobResult,
+        by: &str,
+        asked_again: bool,
+    ) -> Result<(), String> {
         let mut headers = HeaderMap::new();
         headers.insert(WORKER, by);
         let text = result.text().into_bytes();
         let done = self.done(&result.job);
-        if !self
+        let is_first = self
             .publish_first(&done, text.clone(), Some(headers.clone()))
-            .await?
-        {
-            let again = self.again(&result.job);
-            self.publish_first(&again, text, Some(headers)).await?;
+            .await?;
+        if is_first {
+            return Ok(());
         }
+        if !asked_again {
+            let first = self.recorded(results, &done).await?;
+            if first.is_some_and(|(_, first)| first == by) {
+                // It is this very result, whose acknowledgement was lost.
+                return Ok(());
+            }
+        }
+        let again = self.again(&result.job);
+        self.publish_first(&again, text, Some(headers)).await?;
         Ok(())
     }
 

@@ -124,7 +124,8 @@ impl At<'_> {
         let (id, server) = (job.id(), self.server);
         let tries = message.info().map_err(|e| e.to_string())?.delivered;
         let recorded = server.recorded(&self.results, &server.done(&id)).await?;
-        let ended = if message.subject.ends_with(".again") {
+        let asked_again = message.subject.ends_with(".again");
+        let ended = if asked_again {
             match recorded {
                 Some((first, _)) if matches!(first.ended, Ended::Lost(_)) => None,
                 _ if tries > MAX_REPETITIONS => None,
@@ -155,7 +156,9 @@ impl At<'_> {
                 build: self.worker.build.clone(),
                 ended,
             };
-            server.record(&result, &self.worker.name).await?;
+            server
+                .record(&self.results, &result, &self.worker.name, asked_again)
+                .await?;
         }
         // Where the server does not hear it the job comes again, and is found to be recorded.
         let _ = message.double_ack().await;

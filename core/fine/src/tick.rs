@@ -223,6 +223,8 @@ impl FineLoop {
     /// One fine period: fine thread, no allocation, bounded work.
     pub fn tick(&mut self) {
         self.given = OperatorInputs::of(&self.controls);
+        // Nothing of this job is left to be aborted: what is asked now is meant for the one that is about to take over.
+        self.given.abort &= !self.outputs.ended;
         self.cause = StopCause::None;
         self.watch_jog();
         self.take_requests();

@@ -2,6 +2,8 @@
 //! period; it may allocate and be late, but what it queues can always be brought to rest on the path.
 
 mod depth;
+#[cfg(test)]
+mod doubles;
 mod gather;
 mod policy;
 mod queue;

@@ -3,8 +3,9 @@
 use std::sync::{Arc, Mutex};
 
 use super::*;
+use crate::doubles::{Script, block, probe};
 use tandem_gcode::{Input, InputMode, InputWait};
-use tandem_sdk::{AxisVector, BlockKind, Curve, Edge, Event, EventKind, StopOn};
+use tandem_sdk::{AxisVector, Curve, Event, EventKind, StopOn};
 
 /// What a policy was shown: blocks of each window by their index, and the block behind it.
 type Seen = Arc<Mutex<Vec<(Vec<u64>, Option<u64>)>>>;
@@ -47,54 +48,6 @@ impl BlockPolicy for Recorder {
     }
 }
 
-/// Hands out what it was given, a list at a time.
-struct Script(VecDeque<Result<Vec<Item>, String>>);
-
-impl Source for Script {
-    fn next_items(&mut self, items: &mut Vec<Item>) -> Result<bool, String> {
-        match self.0.pop_front() {
-            Some(Ok(more)) => items.extend(more),
-            Some(Err(error)) => return Err(error),
-            None => return Ok(false),
-        }
-        Ok(true)
-    }
-
-    fn provide_input(&mut self, _value: f64) {}
-
-    fn provide_rest(&mut self, _rest: &Rest) -> bool {
-        true
-    }
-}
-
-fn block(index: u64) -> Item {
-    Item::Block(
-        Block {
-            kind: BlockKind::Line,
-            index,
-            line: 1,
-            ..Block::at(AxisVector::ZERO)
-        },
-        None,
-    )
-}
-
-fn probe(index: u64) -> Item {
-    let stop_on = StopOn {
-        edge: Edge::Rising,
-        ..StopOn::default()
-    };
-    Item::Block(
-        Block {
-            kind: BlockKind::Line,
-            index,
-            stop_on,
-            ..Block::at(AxisVector::ZERO)
-        },
-        None,
-    )
-}
-
 fn wait() -> Item {
     let (input, mode) = (Input::Digital(0), InputMode::High);
     Item::Wait(InputWait {
@@ -109,7 +62,7 @@ fn wait() -> Item {
 fn tuned(script: Vec<Result<Vec<Item>, String>>) -> (Tuned<Script, Recorder>, Seen) {
     let recorder = Recorder::default();
     let seen = Arc::clone(&recorder.seen);
-    (Tuned::new(Script(script.into()), recorder), seen)
+    (Tuned::new(Script::of(script), recorder), seen)
 }
 
 /// Everything that comes, until the source is dry or refuses.
@@ -251,7 +204,7 @@ fn what_the_program_states_holds_from_its_place_on_however_windows_fall() {
         script.retain(|items| !items.is_empty());
         let recorder = Recorder::default();
         let seen = Arc::clone(&recorder.of_blocks);
-        let mut source = Tuned::new(Script(script.into_iter().map(Ok).collect()), recorder);
+        let mut source = Tuned::new(Script::of(script.into_iter().map(Ok).collect()), recorder);
         let (handed, error) = drain(&mut source);
         assert_eq!(error, None);
         assert!(

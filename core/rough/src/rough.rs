@@ -431,3 +431,7 @@ fn read_input(wait: &InputWait, inputs: u64) -> Option<f64> {
 #[cfg(test)]
 #[path = "rough_tests.rs"]
 mod tests;
+
+#[cfg(test)]
+#[path = "stream_tests.rs"]
+mod stream_tests;

@@ -6,64 +6,23 @@ use std::sync::atomic::{AtomicBool, AtomicU64};
 
 use tandem_gcode::Item;
 use tandem_rings::{FineEnd, HostEnd, Rest, Sizes, bridge};
-use tandem_sdk::{
-    Accepted, Advanced, AxisVector, Block, BlockKind, Curve, Planner, PlannerDescription,
-    PluginError, Segment, SegmentFlags, SegmentSink,
-};
+use tandem_sdk::{Accepted, AxisVector, Block, Segment, SegmentFlags, SegmentSink};
 
 use super::*;
-
-const ROUGH_PERIOD_S: f64 = 0.01;
+use crate::doubles::{Fake, Plans, ROUGH_PERIOD_S, Script, block};
 
 /// Program time emitted by a call that is asked for this much, and what it says of it: duration and whether it is done.
 type Emits = fn(f64, &mut dyn SegmentSink) -> (f64, bool);
 
-struct Fake {
+struct Emitting {
     emits: Emits,
     calls: Arc<AtomicU64>,
 }
 
-impl Planner for Fake {
-    fn describe(&self) -> PlannerDescription {
-        PlannerDescription::order_2()
-    }
-    fn check(&self, _block: &Block, _curve: Option<Curve<'_>>) -> Result<(), PluginError> {
-        Ok(())
-    }
-    fn accept(
-        &mut self,
-        _block: &Block,
-        _curve: Option<Curve<'_>>,
-    ) -> Result<Accepted, PluginError> {
-        Ok(Accepted::Accepted)
-    }
-    fn finish(&mut self) {}
-    fn advance(
-        &mut self,
-        duration_s: f64,
-        sink: &mut dyn SegmentSink,
-    ) -> Result<Advanced, PluginError> {
+impl Plans for Emitting {
+    fn advance(&mut self, duration_s: f64, sink: &mut dyn SegmentSink) -> (f64, bool) {
         self.calls.fetch_add(1, Relaxed);
-        let (duration_s, done) = (self.emits)(duration_s, sink);
-        Ok(Advanced {
-            duration_s,
-            done: u32::from(done),
-        })
-    }
-    fn reset(&mut self, _position: &AxisVector) {}
-}
-
-/// A program that is over at once: the planner has its whole plan to emit.
-struct Over;
-
-impl Source for Over {
-    fn next_items(&mut self, items: &mut Vec<Item>) -> Result<bool, String> {
-        items.push(Item::End);
-        Ok(false)
-    }
-    fn provide_input(&mut self, _value: f64) {}
-    fn provide_rest(&mut self, _rest: &Rest) -> bool {
-        true
+        (self.emits)(duration_s, sink)
     }
 }
 
@@ -74,15 +33,17 @@ fn with(emits: Emits) -> (RoughLoop, Arc<AtomicU64>, (FineEnd, HostEnd)) {
 
 fn with_ring(sizes: Sizes, emits: Emits) -> (RoughLoop, Arc<AtomicU64>, (FineEnd, HostEnd)) {
     let calls = Arc::new(AtomicU64::new(0));
-    let planner = Box::new(Fake {
+    let planner = Box::new(Fake(Emitting {
         emits,
         calls: Arc::clone(&calls),
-    });
+    }));
+    // The program is over at once: the planner has its whole plan to emit.
+    let over = Script::of(vec![Ok(vec![Item::End])]);
     let (rough, fine, host) = bridge(sizes);
     (
         RoughLoop::new(
             RoughConfig::new(ROUGH_PERIOD_S, ROUGH_PERIOD_S),
-            Box::new(Over),
+            Box::new(over),
             planner,
             rough,
         ),
@@ -187,12 +148,7 @@ impl Source for Sender {
     fn next_items(&mut self, items: &mut Vec<Item>) -> Result<bool, String> {
         if std::mem::take(&mut self.period) && self.given < self.lines {
             self.given += 1;
-            let block = Block {
-                kind: BlockKind::Line,
-                index: self.given,
-                ..Block::at(AxisVector::ZERO)
-            };
-            items.push(Item::Block(block, None));
+            items.push(block(self.given));
         }
         Ok(true)
     }
@@ -216,30 +172,18 @@ struct Waits {
 
 const BLOCK_S: f64 = 3.0 * ROUGH_PERIOD_S;
 
-impl Planner for Waits {
-    fn describe(&self) -> PlannerDescription {
-        PlannerDescription::order_2()
-    }
-    fn check(&self, _block: &Block, _curve: Option<Curve<'_>>) -> Result<(), PluginError> {
-        Ok(())
-    }
-    fn accept(
-        &mut self,
-        _block: &Block,
-        _curve: Option<Curve<'_>>,
-    ) -> Result<Accepted, PluginError> {
+impl Plans for Waits {
+    fn accept(&mut self, _block: &Block) -> Accepted {
         self.left_s += BLOCK_S;
         self.finished.store(false, Relaxed);
-        Ok(Accepted::Accepted)
+        Accepted::Accepted
     }
+
     fn finish(&mut self) {
         self.finished.store(true, Relaxed);
     }
-    fn advance(
-        &mut self,
-        duration_s: f64,
-        sink: &mut dyn SegmentSink,
-    ) -> Result<Advanced, PluginError> {
+
+    fn advance(&mut self, duration_s: f64, sink: &mut dyn SegmentSink) -> (f64, bool) {
         let finished = self.finished.load(Relaxed);
         let kept_s = if finished { 0.0 } else { ROUGH_PERIOD_S };
         let emitted_s = duration_s.min(self.left_s - kept_s).max(0.0);
@@ -249,22 +193,18 @@ impl Planner for Waits {
             let flags = [SegmentFlags::default(), SegmentFlags::ENDS_AT_REST];
             piece(emitted_s, flags[usize::from(done)], sink);
         }
-        Ok(Advanced {
-            duration_s: emitted_s,
-            done: u32::from(done),
-        })
+        (emitted_s, done)
     }
-    fn reset(&mut self, _position: &AxisVector) {}
 }
 
 #[test]
 fn what_a_sender_has_sent_is_driven_as_far_as_it_is_known_before_its_end_is_planned() {
     const LINES: u64 = 12;
     let finished = Arc::new(AtomicBool::new(false));
-    let planner = Box::new(Waits {
+    let planner = Box::new(Fake(Waits {
         left_s: 0.0,
         finished: Arc::clone(&finished),
-    });
+    }));
     let sender = Sender {
         lines: LINES,
         given: 0,

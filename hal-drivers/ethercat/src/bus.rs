@@ -15,8 +15,8 @@ use crate::check::emulated;
 use crate::cyclic::Cyclic;
 use crate::drive::{Drive, Moves};
 use crate::link::Link;
-use crate::map::u16_at;
 use crate::master::Master;
+use crate::member::{Member, OP};
 use crate::options::{EMULATED, Encoder, Options, Sync};
 use crate::requests::{Desk, Request};
 use crate::survey::{Object, Value};
@@ -40,8 +40,7 @@ const QUIET_SHARE: f64 = 0.3;
 /// Exchanges before OP is asked for: clocks and drives settle.
 const SETTLE_EXCHANGES: u64 = 60;
 
-/// States of the bus.
-const OP: u16 = 8;
+/// A device has refused a state.
 const ERROR: u16 = 0x10;
 
 /// Objects that the driver tells its drives in every period: nobody else writes them.
@@ -51,21 +50,6 @@ const OF_THE_DRIVER: [u16; 8] = [
 
 /// What is asked of an object, on its way through the gaps between exchanges.
 type Job = Pin<Box<dyn Future<Output = Result<Value, String>> + Send>>;
-
-/// A device that takes part in the exchange.
-#[derive(Debug)]
-struct Member {
-    ready: Ready,
-    /// Exchanges in a row without its answer.
-    silent: u32,
-    /// Why it counts as lost, from then on.
-    lost: Option<u32>,
-    /// Its state, as it was asked for last.
-    al: u16,
-    al_code: u16,
-    /// Its inputs, as they came last.
-    inputs: Vec<u8>,
-}
 
 /// How a device is.
 pub(crate) struct Seen<'a> {
@@ -428,7 +412,7 @@ impl Bus {
         for member in &mut self.members {
             let options = &self.options.devices[member.ready.options];
             if member.lost.is_none() {
-                read_lines(options, member, feedback);
+                member.read_lines(options, feedback);
             }
             let age = u16::try_from(member.silent).unwrap_or(u16::MAX);
             for line in options.inputs.iter().filter(|line| **line >= 0) {
@@ -648,61 +632,6 @@ impl Drop for Bus {
         if let Some(master) = self.master.take() {
             master.give_back();
         }
-    }
-}
-
-impl Member {
-    /// Its answer is missing once more.
-    fn miss(&mut self, came: bool, patience: u32) {
-        self.silent = self.silent.saturating_add(1);
-        if let Some(drive) = &mut self.ready.drive {
-            drive.miss();
-        }
-        if self.silent <= patience {
-            return;
-        }
-        // Its state is asked for while it is missing; what it said then is the better reason.
-        let left = came && self.al & 0x0f != OP;
-        let why = match (left, came) {
-            (true, _) => own::LEFT_STATE | u32::from(self.al_code),
-            (false, true) => own::WORKING_COUNTER,
-            (false, false) => own::NO_ANSWER,
-        };
-        let better = left
-            && self
-                .lost
-                .is_some_and(|lost| lost & 0xffff_0000 != own::LEFT_STATE);
-        if self.lost.is_none() || better {
-            self.lost = Some(why);
-        }
-    }
-}
-
-/// Inputs and analog values of a device.
-fn read_lines(options: &crate::options::DeviceOptions, member: &Member, feedback: &mut Feedback) {
-    let bits = |bit: usize| match &member.ready.drive {
-        Some(drive) => bit < 32 && drive.digital >> bit & 1 == 1,
-        None => member
-            .inputs
-            .get(bit / 8)
-            .is_some_and(|byte| byte >> (bit % 8) & 1 == 1),
-    };
-    for (bit, line) in options
-        .inputs
-        .iter()
-        .enumerate()
-        .filter(|(_, line)| **line >= 0)
-    {
-        let mask = 1_u64 << line;
-        feedback.inputs = if bits(bit) {
-            feedback.inputs | mask
-        } else {
-            feedback.inputs & !mask
-        };
-    }
-    for analog in &options.analog {
-        let value = f64::from(u16_at(&member.inputs, analog.byte).cast_signed());
-        feedback.analog[analog.input] = value * analog.scale + analog.offset;
     }
 }
 

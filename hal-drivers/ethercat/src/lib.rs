@@ -20,6 +20,7 @@ mod driver;
 mod link;
 mod map;
 mod master;
+mod member;
 mod options;
 mod probe;
 mod reactions;

@@ -28,7 +28,7 @@ use super::path::DrawnPath;
 use super::programs::Upload;
 use super::scope::Scope;
 use super::states::ControllerState;
-use crate::jog::JogController;
+use crate::jog::{Jog, JogController};
 use crate::operator::OperatorHub;
 
 /// Longest program, bytes.
@@ -496,7 +496,8 @@ impl Desk {
     /// The loop that drives.
     pub fn give_up_order(&self, position: AxisVector) {
         let mut inner = self.lock();
-        (inner.order, inner.aborting) = (None, false);
+        inner.order = None;
+        self.forget_abort(&mut inner);
         drop(inner);
         self.hub.controls().hold.store(false, Relaxed);
         let dropped = lock(&self.lines).end_job(position, false, false, false);
@@ -540,9 +541,19 @@ impl Desk {
             self.fault_in(&mut inner, words);
         }
         let ended = inner.history.end(outcome, how, self.now_unix_ms());
-        // Before anybody can ask for the next jog: one that is asked for behind this is not to be forgotten.
+        // Before anybody can ask for the next jog: one that is asked for behind this is not to be forgotten, nor one that came when
+        // this job looked for none any more.
+        let late = if outcome.fault.is_none() {
+            self.jogs.take_waiting()
+        } else {
+            vec![]
+        };
         self.stands(&outcome.position, unknown_axes);
-        (inner.mode, inner.unknown_axes, inner.aborting) = (Mode::Idle, unknown_axes, false);
+        (inner.mode, inner.unknown_axes) = (Mode::Idle, unknown_axes);
+        self.forget_abort(&mut inner);
+        if self.ask_again(late) && inner.order.is_none() {
+            inner.order = Some(Order::Jog);
+        }
         inner.enabled = outcome.fault.is_none() && (mode != Mode::Enabling || !outcome.aborted);
         drop(inner);
         if let Some((id, end)) = ended {
@@ -555,6 +566,27 @@ impl Desk {
             self.send(None, &described::job_event(&self.machine, &job, outcome));
         }
         self.tell_state();
+    }
+
+    /// Asks for jogs from where the machine stands now; whether any waits.
+    fn ask_again(&self, jogs: Vec<Jog>) -> bool {
+        for jog in jogs {
+            if let Err(why) = self.jogs.ask(jog) {
+                self.tell_refused("jogging", &why);
+            }
+        }
+        !self.jogs.is_still()
+    }
+
+    /// Tells everybody that a job cannot begin.
+    pub fn tell_refused(&self, job: &str, why: &str) {
+        self.send(None, &json!({ "event": "refused", "job": job, "why": why }));
+    }
+
+    /// An abort that came too late for the job that is over is not one of the next job.
+    fn forget_abort(&self, inner: &mut Inner) {
+        inner.aborting = false;
+        self.hub.controls().abort.store(false, Relaxed);
     }
 
     /// The machine stands at `position`, and takes jogs from there.
@@ -582,7 +614,8 @@ impl Desk {
     /// A fault has come while nothing was driven, or the drives could not be enabled. The loop that drives.
     pub fn fault(&self, words: &str) {
         let mut inner = self.lock();
-        (inner.mode, inner.aborting) = (Mode::Idle, false);
+        inner.mode = Mode::Idle;
+        self.forget_abort(&mut inner);
         let order = inner.order.take_if(|order| order.moves());
         self.fault_in(&mut inner, words);
         drop(inner);

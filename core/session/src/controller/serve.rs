@@ -465,10 +465,7 @@ impl<'r> Controller<'r> {
                 self.desk.give_up_order(self.resident.machine().start);
                 match from {
                     Some(from) => self.desk.answer(from, Err(why.to_string())),
-                    None => self.desk.send(
-                        None,
-                        &json!({ "event": "refused", "job": name, "why": why.to_string() }),
-                    ),
+                    None => self.desk.tell_refused(name, &why.to_string()),
                 }
                 Ok(())
             }

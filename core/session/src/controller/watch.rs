@@ -236,9 +236,6 @@ impl JogInput for Refusals {
     fn rested(&mut self, _jogs: &JogController, _rest: &JogRest) {}
 
     fn refused(&mut self, why: &str) {
-        self.0.send(
-            None,
-            &json!({ "event": "refused", "job": "jogging", "why": why }),
-        );
+        self.0.tell_refused("jogging", why);
     }
 }

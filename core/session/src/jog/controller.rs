@@ -188,6 +188,11 @@ impl JogController {
         inner.waiting.clear();
     }
 
+    /// Jogs that have come too late for what is driven to take them up: they begin something of their own.
+    pub(crate) fn take_waiting(&self) -> Vec<Jog> {
+        self.lock().waiting.drain(..).collect()
+    }
+
     /// Everything is driven and the machine stands: whether a jog is over by that.
     pub(crate) fn arrived(&self) -> Option<JogRest> {
         let mut inner = self.lock();

@@ -189,6 +189,35 @@ fn a_stop_overtakes_what_is_about_to_begin() {
     }
 }
 
+/// Whenever a step is asked for while the one before is driven, ends or has ended, it is driven too.
+#[test]
+fn a_jog_that_is_asked_for_in_any_period_of_the_one_before_is_driven() {
+    let jog = || json!({ "axis": "x", "distance_mm": 0.1, "feed_mm_per_min": 3000.0 });
+    let mut says = Says::new();
+    let mut shown = vec![];
+    for apart in 0..160 {
+        says.ask(400, "jog", jog());
+        says.ask(apart, "jog", jog());
+        shown.push((apart, says.ask(400, "status", json!({}))));
+    }
+    let told = Told::by(&mill(), says, |_| (), Box::new(NoKeeper));
+    let mut jobs = 0;
+    for ((apart, id), steps) in shown.into_iter().zip((2..).step_by(2)) {
+        let x_mm = told.ok(id)["position"]["x_mm"].as_f64().unwrap();
+        let expected_mm = f64::from(steps) * 0.1;
+        assert!(
+            (x_mm - expected_mm).abs() < 1e-9,
+            "{apart} periods behind: {x_mm} of {expected_mm} mm"
+        );
+        jobs += 1;
+    }
+    let own = told.jobs().len();
+    assert!(
+        own > jobs && own < 2 * jobs,
+        "some join the job before, others do not: {own} of {jobs}"
+    );
+}
+
 /// The controller ends while lines wait.
 #[test]
 fn lines_that_wait_at_the_end_are_told() {
