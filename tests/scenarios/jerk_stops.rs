@@ -133,7 +133,7 @@ fn holds_on_smooth_take_little_more_than_the_shortest() {
     stops_are_short(
         "watched-smooth",
         "holds_on_smooth_take_little_more_than_the_shortest",
-        12,
+        6,
         0.99,
     );
 }
@@ -143,7 +143,7 @@ fn holds_on_nurbs_take_little_more_than_the_shortest() {
     stops_are_short(
         "watched-nurbs",
         "holds_on_nurbs_take_little_more_than_the_shortest",
-        15,
+        7,
         0.99,
     );
 }

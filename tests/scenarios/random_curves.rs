@@ -252,7 +252,7 @@ fn on_the_demo_machine(text: &str, form: &str) -> Scenario {
 #[test]
 fn random_curves_run_within_limits() {
     for form in ["scan", "windowed"] {
-        for_each_seed("random_curves_run_within_limits", 3, |seed| {
+        for_each_seed("random_curves_run_within_limits", 2, |seed| {
             attempted(|| {
                 let done = on_the_demo_machine(&program(seed, 80), form).run();
                 done.assert_within_limits();

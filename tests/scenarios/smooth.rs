@@ -9,7 +9,7 @@ use tandem_rings::Sample;
 use crate::bench::{Bench, Ran, passed};
 use crate::harness::{Done, Scenario, UNDISTURBED, root};
 use crate::random::{Random, program};
-use crate::replay::{for_each_seed, for_each_tick};
+use crate::replay::{for_each_seed, for_each_tick, some_of};
 
 fn machine() -> PathBuf {
     root().join("examples/machines/mill-3axis-smooth.toml")
@@ -277,7 +277,7 @@ fn smooth_holds_at_every_tick() {
     let mut worst = 0.0f64;
     for_each_tick(
         "smooth_holds_at_every_tick",
-        1..free.samples.len() - 1,
+        some_of(4, "smooth_holds_at_every_tick", 1..free.samples.len() - 1),
         |tick| {
             let ran = bench.run(&format!("{tick},hold\n{},resume", tick + 400));
             check(&bench, &ran)?;
@@ -310,7 +310,7 @@ fn smooth_holds_in_zigzags() {
     let free = bench.run("");
     for_each_tick(
         "smooth_holds_in_zigzags",
-        (1..free.samples.len() - 1).step_by(3),
+        some_of(6, "smooth_holds_in_zigzags", 1..free.samples.len() - 1),
         |tick| {
             check(
                 &bench,
@@ -327,7 +327,7 @@ fn smooth_holds_on_the_square() {
     let free = bench.run("");
     for_each_tick(
         "smooth_holds_on_the_square",
-        (2..free.samples.len() - 1).step_by(3),
+        some_of(9, "smooth_holds_on_the_square", 2..free.samples.len() - 1),
         |tick| {
             check(
                 &bench,

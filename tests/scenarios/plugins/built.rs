@@ -15,24 +15,18 @@ fn target() -> &'static Path {
         .unwrap()
 }
 
-/// Where plugins outside the workspace are built, all with the same settings, so that they share what they depend on.
+/// Where plugins are built that others may have written, all with the same settings, so that they share what they depend on.
 pub fn third_party_target() -> PathBuf {
     target().join("third-party")
 }
 
-fn plain_cargo() -> Command {
-    let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-    cargo.env("CARGO_TERM_COLOR", "never");
-    cargo
-}
-
-/// Cargo for plugins outside the workspace.
+/// Cargo for such plugins.
 pub fn cargo() -> Command {
-    let mut cargo = plain_cargo();
+    let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     cargo
+        .env("CARGO_TERM_COLOR", "never")
         .env("CARGO_TARGET_DIR", third_party_target())
-        .env("CARGO_INCREMENTAL", "0");
-    cargo
+        .env("CARGO_INCREMENTAL", "0")
         .env("CARGO_PROFILE_DEV_DEBUG", "false")
         .env("CARGO_PROFILE_DEV_OPT_LEVEL", "1");
     cargo
@@ -75,16 +69,15 @@ pub fn third_party(name: &str) -> PathBuf {
     folder.join(file(name))
 }
 
-/// A built-in plugin as a shared library: its crate says nothing of one, and has no feature for it. What it depends on is
-/// built already.
+/// A built-in plugin as a shared library: its crate says nothing of one, and has no feature for it. Alone it takes other features of
+/// what it depends on than the workspace does, those of plugins outside: so it is built beside them.
 pub fn built_in(package: &str) -> PathBuf {
-    let mut command = plain_cargo();
+    let mut command = cargo();
     command
         .current_dir(root())
-        .env("CARGO_TARGET_DIR", target())
         .args(["rustc", "--offline", "--locked", "--lib"]);
     run(command.args(["--crate-type", "cdylib", "-p", package]));
-    target().join("debug").join(file(package))
+    third_party_target().join("debug").join(file(package))
 }
 
 /// The mill's file without the table `section` and those below it.
