@@ -1,8 +1,7 @@
 //! Attaching: from drives without torque to joints that hold, from a fault back to work. The drives of these tests start
 //! anywhere, enable one after the other, sag while they do, and fail in any state.
 
-#[allow(dead_code)] // what other tests need of it
-mod demanding;
+use crate::demanding;
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;

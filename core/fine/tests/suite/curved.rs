@@ -1,7 +1,6 @@
 //! Kinematics that are not linear, after a fault: where a joint cannot follow the axes, it goes to rest by its own limit.
 
-#[allow(dead_code)] // what other tests need of it
-mod common;
+use crate::common;
 
 use std::sync::atomic::Ordering::Relaxed;
 

@@ -1,9 +1,7 @@
 //! No sample is faster than the programmed feed, where the plan goes beyond it because a higher feed may be asked for.
 
-#[allow(dead_code)] // what other tests need of it
-mod common;
-#[allow(dead_code)] // what other tests need of it
-mod smooth;
+use crate::common;
+use crate::smooth;
 
 use common::{Bench, FEED_MM_PER_S};
 use smooth::{LIMITS, Machine, Plan, profile};

@@ -1,7 +1,6 @@
 //! Homing by the drive: a joint is handed over, neither followed nor judged, and adopted where its drive says that it is.
 
-#[allow(dead_code)] // what other tests need of it
-mod demanding;
+use crate::demanding;
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;

@@ -1,7 +1,6 @@
 //! The governor under a jerk limit: holds, resumes and overrides on plans that keep velocity, acceleration and jerk.
 
-#[allow(dead_code)] // what other tests need of it
-mod smooth;
+use crate::smooth;
 
 use std::f64::consts::TAU;
 

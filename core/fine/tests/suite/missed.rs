@@ -1,7 +1,6 @@
 //! Missed periods: counted at rest, and in motion a fault where they are too many in a row or in a second.
 
-#[allow(dead_code)] // what other tests need of it
-mod common;
+use crate::common;
 
 use std::collections::VecDeque;
 use std::sync::atomic::Ordering::Relaxed;

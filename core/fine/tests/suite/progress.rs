@@ -1,7 +1,6 @@
 //! Progress of program time: slow is not still, and still is a fault.
 
-#[allow(dead_code)] // what other tests need of it
-mod common;
+use crate::common;
 
 use std::sync::atomic::Ordering::Relaxed;
 

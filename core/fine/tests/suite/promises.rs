@@ -1,7 +1,6 @@
 //! Promises of the fine loop that nothing else of this package would miss.
 
-#[allow(dead_code)] // what other tests need of it
-mod common;
+use crate::common;
 
 use std::sync::atomic::Ordering::Relaxed;
 

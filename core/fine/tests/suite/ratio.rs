@@ -1,7 +1,6 @@
 //! A ratio that strategy and policy change once in a rough period reaches the axes as a ramp and not as a staircase.
 
-#[allow(dead_code)] // what other tests need of it
-mod smooth;
+use crate::smooth;
 
 use std::f64::consts::TAU;
 

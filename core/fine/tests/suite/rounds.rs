@@ -1,7 +1,6 @@
 //! Fault, reset, run again: a hundred times on one machine, each joint in each phase, on machines that are drawn.
 
-#[allow(dead_code)] // what other tests need of it
-mod demanding;
+use crate::demanding;
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;

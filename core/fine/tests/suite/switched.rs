@@ -1,7 +1,6 @@
 //! What a fault and an emergency stop switch off, and when, whatever the machine is doing.
 
-#[allow(dead_code)] // what other tests need of it
-mod common;
+use crate::common;
 
 use std::sync::atomic::Ordering::Relaxed;
 

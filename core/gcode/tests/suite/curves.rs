@@ -1,6 +1,6 @@
 //! NURBS and Bezier curves of part programs.
 
-mod common;
+use crate::common;
 
 use common::{messages, mill, only_blocks, run, run_on, shown};
 use std::sync::Arc;

@@ -1,6 +1,6 @@
 //! The messages that people read.
 
-mod common;
+use crate::common;
 
 use common::{messages, mill, programs};
 use tandem_gcode::{Program, check};

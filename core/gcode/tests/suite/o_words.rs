@@ -1,6 +1,6 @@
 //! O-words: subroutines, branches and loops, in both passes.
 
-mod common;
+use crate::common;
 
 use std::path::PathBuf;
 

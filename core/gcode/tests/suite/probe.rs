@@ -1,6 +1,6 @@
 //! G38.2 to G38.5 and G31: what they order, what they refuse, and what the program knows afterwards.
 
-mod common;
+use crate::common;
 
 use common::{blocks, messages, mill, only_blocks, run, shown};
 use tandem_gcode::{Config, Item, ProbeInput, ProbeResult, Program, ProgramError, Stream, check};

@@ -1,6 +1,6 @@
 //! Properties that hold for every program, tried on random ones.
 
-mod common;
+use crate::common;
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;

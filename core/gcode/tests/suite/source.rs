@@ -1,6 +1,6 @@
 //! Files: pipes, endings, changes between the passes, and what is no program at all.
 
-mod common;
+use crate::common;
 
 use std::io::Write;
 

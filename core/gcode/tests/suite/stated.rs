@@ -1,6 +1,6 @@
 //! What a program states for somebody who watches for it: in comments and in named parameters, in the order of its lines.
 
-mod common;
+use crate::common;
 
 use common::{mill, run_on};
 use tandem_gcode::{Config, Item, Program, Stream, Watched, check};

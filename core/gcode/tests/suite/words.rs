@@ -1,6 +1,6 @@
 //! What lines do whatever their words: the tests of the words stand beside them in `src/words`.
 
-mod common;
+use crate::common;
 
 use common::{
     assert_items, blocks, ends, errors_of, last, mill, only_blocks, programs, run_on, short,

@@ -1,6 +1,6 @@
 //! The driver against the emulator, exchange by exchange on virtual time.
 
-mod common;
+use crate::common;
 
 use proptest::prelude::*;
 use tandem_ethercat::{EthercatDrives, Options};

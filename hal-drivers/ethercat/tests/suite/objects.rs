@@ -1,6 +1,6 @@
 //! Objects that are read and written while drives move: neither what they are told nor what they answer changes by it.
 
-mod common;
+use crate::common;
 
 use std::fmt::Write;
 

@@ -1,6 +1,6 @@
 //! The errors of the classical scheme as Lee and Lee compare them: corners, arcs, cycle time, feed at a corner.
 
-mod common;
+use crate::common;
 
 use common::{FILTERS, context, drive, norm, open, polyline};
 use serde_json::Value;

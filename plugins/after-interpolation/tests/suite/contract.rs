@@ -1,6 +1,6 @@
 //! The planner contract: stops, dwells, rapids, flags, reports, refusals, buffer.
 
-mod common;
+use crate::common;
 
 use common::{FILTERS, context, drive, line, norm, open, polyline};
 use tandem_after_interpolation::{AfterInterpolation, BUFFER_BLOCKS, Options};

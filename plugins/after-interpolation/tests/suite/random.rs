@@ -1,6 +1,6 @@
 //! Random programs: what holds for every filter, time constant and path. A failing program is printed, reduced.
 
-mod common;
+use crate::common;
 
 use common::{FILTERS, context, drive, line, norm, open};
 use proptest::prelude::*;

@@ -2,7 +2,7 @@
 //! command feed, overlaps no longer than `TA`. Judged by the emitted motion and the program, not by what the planner says of
 //! itself. Over random programs with random time constants; a failure prints the seed of its program.
 
-mod common;
+use crate::common;
 
 use common::{context, published, run};
 use tandem_block_overlap::{CornerControl, LimitMode, Options};

@@ -1,6 +1,6 @@
 //! The published cases of the block overlap, run through the planner as the rough loop runs it.
 
-mod common;
+use crate::common;
 
 use common::{context, published, run};
 use serde_json::Value;

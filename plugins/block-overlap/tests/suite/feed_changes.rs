@@ -1,7 +1,7 @@
 //! Programs whose feed changes from block to block: driving through costs no more than stopping, and a higher feed does not
 //! cost time. A failure prints the seed of its program.
 
-mod common;
+use crate::common;
 
 use common::{context, run};
 use tandem_block_overlap::{LimitMode, Options};

@@ -1,6 +1,6 @@
 //! The axis rule: over every window of samples an axis changes its velocity by at most A·Δt + V.
 
-mod common;
+use crate::common;
 
 use common::{context, run};
 use proptest::prelude::*;

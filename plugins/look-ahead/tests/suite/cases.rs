@@ -1,6 +1,6 @@
 //! The published cases of the two-step look-ahead, run through the planner as the rough loop runs it.
 
-mod common;
+use crate::common;
 
 use common::{context, run, tangent};
 use serde_json::Value;

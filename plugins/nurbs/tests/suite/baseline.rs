@@ -1,6 +1,6 @@
 //! The published baseline against its reference figures.
 
-mod common;
+use crate::common;
 
 use common::measure::{chord_error_mm, distance, realised_mm};
 use common::{canonical, context, curve_block, run};

@@ -1,6 +1,6 @@
 //! The forms with windows on the canonical curves: limits on every sample, and the time against the best known.
 
-mod common;
+use crate::common;
 
 use common::measure::{BEST_S, Figures, figures};
 use common::{canonical, context, curve_block, run};

@@ -1,6 +1,6 @@
 //! A dwell is cut into parts of any length, also one that rounding loses beside the dwell.
 
-mod common;
+use crate::common;
 
 use common::context;
 use tandem_nurbs::{NurbsPlanner, Options};

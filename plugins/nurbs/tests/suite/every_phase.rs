@@ -3,7 +3,7 @@
 //!
 //! `TANDEM_SEED=7` runs one seed, `TANDEM_SEEDS=500` so many.
 
-mod common;
+use crate::common;
 
 use std::fmt::Write;
 

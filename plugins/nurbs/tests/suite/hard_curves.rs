@@ -1,6 +1,6 @@
 //! The forms with windows on curves that are hard to drive: limits kept on every sample, the end met, or an error that says why.
 
-mod common;
+use crate::common;
 
 use std::f64::consts::FRAC_PI_2;
 

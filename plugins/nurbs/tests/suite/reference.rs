@@ -1,6 +1,6 @@
 //! The reference figures of times and of sampled accelerations and jerks, against what is driven and how it is measured.
 
-mod common;
+use crate::common;
 
 use common::measure::{BEST_S, Figures, figures};
 use common::{canonical, context, curve_block, run};

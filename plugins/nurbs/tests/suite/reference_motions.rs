@@ -1,6 +1,6 @@
 //! Near-optimal motions of somebody else (path coordinates at 2 ms): our curves judged by them, and our motions beside them.
 
-mod common;
+use crate::common;
 
 use common::measure::{BEST_S, chord_error_mm, differences, realised_mm, xy};
 use common::{canonical, context, curve_block, run};

@@ -1,6 +1,6 @@
 //! Blocks so short that many of them are driven in a fine period, some in less time than a segment may have.
 
-mod common;
+use crate::common;
 
 use common::run;
 use tandem_rig::line;

@@ -1,6 +1,6 @@
 //! Lines at a steady feed through many windows: no faster than programmed anywhere, and no rest before the end.
 
-mod common;
+use crate::common;
 
 use common::{context, run};
 use tandem_sdk::{AxisVector, Block, BlockKind, SegmentFlags};

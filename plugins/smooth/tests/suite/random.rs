@@ -1,6 +1,6 @@
 //! Random programs: within all limits every time. What they cost against a stop at every corner is printed.
 
-mod common;
+use crate::common;
 
 use common::programs::{KINDS, program};
 use common::{context, judge, run, samples};

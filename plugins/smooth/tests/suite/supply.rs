@@ -1,6 +1,6 @@
 //! The supply of blocks ends, or is late, behind any block: at rest at the end of what was there, within all limits.
 
-mod common;
+use crate::common;
 
 use common::programs::program;
 use common::{Collected, Point, context, judge, lines, read, run, samples};

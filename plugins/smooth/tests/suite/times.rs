@@ -1,6 +1,6 @@
 //! The programs that other planners are compared on: time, limits, tolerance, and how little the settings matter.
 
-mod common;
+use crate::common;
 
 use common::{Peaks, context, judge, lines, read, run, samples};
 use tandem_smooth::{Effort, Options};

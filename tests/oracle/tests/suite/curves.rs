@@ -1,6 +1,6 @@
 //! NURBS curves: a quarter of a circle as a curve is that quarter, and nothing beside it.
 
-mod common;
+use crate::common;
 
 use common::{Profile, assert_finds, assert_passes, at, stop_at_all, verdict};
 use tandem_oracle::{Kind, Outcome, Position};

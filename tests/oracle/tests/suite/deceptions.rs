@@ -1,6 +1,6 @@
 //! Runs that look right and are not, and runs that look wrong and are right.
 
-mod common;
+use crate::common;
 
 use std::{fmt::Write, time::Instant};
 

@@ -1,6 +1,6 @@
 //! Long programs of short blocks are judged in a moment.
 
-mod common;
+use crate::common;
 
 use std::{fmt::Write, time::Instant};
 

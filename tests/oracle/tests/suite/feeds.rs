@@ -1,6 +1,6 @@
 //! Feeds block by block, and what is not judged at all.
 
-mod common;
+use crate::common;
 
 use common::{
     Profile, assert_finds, assert_passes, at, polyline, smooth_machine, stop_at_all, trace, verdict,

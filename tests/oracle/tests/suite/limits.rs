@@ -1,6 +1,6 @@
 //! The limits of the axes: a correct run passes, and each way to break it is found as what it is.
 
-mod common;
+use crate::common;
 
 use common::{
     Profile, assert_finds, assert_passes, at, machine, polyline, smooth_machine, trace, verdict,

@@ -1,6 +1,6 @@
 //! The programmed path: lines, corners, arcs, helices, rotary axes, and what a judge could be fooled by.
 
-mod common;
+use crate::common;
 
 use std::f64::consts::PI;
 

@@ -1,6 +1,6 @@
 //! The program reader: every word it knows moves the path as it should, every other one is refused by name.
 
-mod common;
+use crate::common;
 
 use common::{assert_passes, at, smooth_machine, stop_at_all, trace, verdict};
 use tandem_oracle::{Check, Kind, Options, Outcome, Position, judge};

@@ -1,6 +1,6 @@
 //! Random programs: a correct run passes, and no single sample can be moved without being found.
 
-mod common;
+use crate::common;
 
 use std::fmt::Write;
 

@@ -1,6 +1,6 @@
 //! Files: the trace by column name, the machine with its includes, and the command.
 
-mod common;
+use crate::common;
 
 use std::{fmt::Write, fs, path::Path, process::Command};
 

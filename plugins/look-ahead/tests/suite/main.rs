@@ -1,0 +1,6 @@
+//! The look-ahead planner. One program for all of these tests: linking one for each costs a clean build a minute.
+
+mod axis;
+mod cases;
+#[path = "../common/mod.rs"]
+mod common;

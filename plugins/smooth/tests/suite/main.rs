@@ -1,0 +1,7 @@
+//! The smooth planner. One program for all of these tests: linking one for each costs a clean build a minute.
+
+#[path = "../common/mod.rs"]
+mod common;
+mod random;
+mod supply;
+mod times;
