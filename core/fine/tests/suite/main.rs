@@ -1,6 +1,7 @@
 //! The fine loop. One program for all of these tests: linking one for each costs a clean build a minute.
 
 mod attach;
+#[allow(dead_code)] // what tests beside these need of it
 #[path = "../common/mod.rs"]
 mod common;
 mod curved;
