@@ -1,6 +1,5 @@
 //! The driver for EtherCAT on an emulated bus. One program for all of these tests: linking one for each costs a clean build a minute.
 
-mod again;
 mod bus;
 #[path = "../common/mod.rs"]
 mod common;

@@ -1,6 +1,6 @@
 //! A bus that is attached again and again in one process: behind a fault, behind a cable that was pulled, for ever.
 
-use crate::common;
+mod common;
 
 use std::sync::{Mutex, PoisonError};
 
