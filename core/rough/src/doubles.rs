@@ -71,6 +71,7 @@ impl<P: Plans> Planner for Fake<P> {
 
 /// What a program was told: an input's answer, or a rest.
 #[derive(Clone, Debug, PartialEq)]
+#[allow(clippy::large_enum_variant)] // a handful in a test
 pub enum Answer {
     Input(f64),
     Rest(Rest),

@@ -149,7 +149,7 @@ impl Rig {
     }
 
     /// Rough periods until the program is over.
-    fn to_the_end(&mut self) {
+    fn drive_to_the_end(&mut self) {
         for _ in 0..100 {
             let progress = self.step();
             self.drive();
@@ -229,7 +229,7 @@ fn words_act_where_they_stand_and_blocks_are_told_in_their_order() {
         vec![block(4), event(5), Item::End],
     ];
     let mut rig = Rig::of(lists);
-    rig.to_the_end();
+    rig.drive_to_the_end();
     let at = |blocks: u32| f64::from(blocks) * BLOCK_S;
     let expected = [
         ("event", 0, at(0)),
@@ -267,7 +267,7 @@ fn behind_an_abort_only_what_the_program_gives_then_is_driven_from_there() {
         while rig.fine.segments.pop().is_ok() {}
         let stop = rest(RestCause::Abort);
         rig.rests(stop);
-        rig.to_the_end();
+        rig.drive_to_the_end();
         assert_eq!(rig.told(), [Answer::Rest(stop)]);
         assert_eq!(*rig.resets.lock().unwrap(), [stop.position]);
         assert_eq!(rig.seen.rests, [RestCause::Abort]);
@@ -358,7 +358,7 @@ fn behind_an_edge_the_rest_of_the_line_counts_at_the_new_place() {
         (dwell.start, dwell.end),
         (touched.position, touched.position)
     );
-    rig.to_the_end();
+    rig.drive_to_the_end();
     let order: Vec<_> = rig.driven().iter().map(|of| (of.0, of.1)).collect();
     assert_eq!(
         order,
@@ -436,7 +436,7 @@ fn nothing_is_planned_before_the_joints_hold_and_then_from_where_they_stand() {
     assert_eq!(rig.driven(), []);
     let attached = rest(RestCause::Attached);
     rig.rests(attached);
-    rig.to_the_end();
+    rig.drive_to_the_end();
     assert_eq!(*rig.resets.lock().unwrap(), [attached.position]);
     assert_eq!(rig.seen.rests, [], "nobody has stopped anything");
     let from_s = attached.program_time_s;
@@ -494,7 +494,7 @@ fn an_input_is_read_where_the_machine_rests_and_what_follows_waits_for_it() {
             let most = (timeout_s / ROUGH_PERIOD_S) as u32;
             assert!((most..=most + 2).contains(&periods), "{periods} periods");
         }
-        rig.to_the_end();
+        rig.drive_to_the_end();
         assert!(!rig.rough.is_waiting());
         assert_eq!(rig.driven().len(), 3);
     }
@@ -504,7 +504,7 @@ fn an_input_is_read_where_the_machine_rests_and_what_follows_waits_for_it() {
         Item::End,
     ]];
     let mut rig = Rig::of(lists);
-    rig.to_the_end();
+    rig.drive_to_the_end();
     assert_eq!(rig.told(), [Answer::Input(0.0)]);
 }
 
@@ -521,7 +521,7 @@ fn a_source_that_waits_for_the_rest_is_asked_when_all_is_driven() {
         assert_eq!(rig.seen.blocks.len(), blocks);
         rig.drive();
     }
-    rig.to_the_end();
+    rig.drive_to_the_end();
     assert_eq!(rig.driven().len(), 3);
 }
 
@@ -549,7 +549,7 @@ fn what_a_planner_must_not_emit_is_named() {
                 sink.segment(&Segment::rest(
                     &AxisVector([f64::INFINITY; tandem_sdk::MAX_AXES]),
                     1.0,
-                ))
+                ));
             },
             Some("not finite"),
         ),
