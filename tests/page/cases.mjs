@@ -278,7 +278,7 @@ export async function many() {
       const { answers, painted, points } = await page.evaluate(() => ({ answers: window.answers, painted: window.tandem.paintedPoints, points: window.tandem.drawnPoints }));
       console.log(`${LINES} lines: drawn in ${seconds.toFixed(1)} s, heap ${heap.toFixed(0)} MB, longest task ${longest.toFixed(0)} ms (${quiet.toFixed(0)} ms before), ${answers} answers, ${(painted / points).toFixed(2)} times painted`);
       check(heap <= 250, `the heap has ${heap} MB`);
-      check(answers <= LINES / 2500, `${answers} answers for ${points} points`);
+      check(answers <= 120, `${answers} answers for ${points} points`);
       check(painted <= 1.5 * points, `${painted} points painted for ${points}`);
       if (process.env.TANDEM_QUIET) check(seconds <= 4 && longest <= 200, `${seconds} s, ${longest} ms`);
       clean(page);
@@ -474,7 +474,7 @@ export async function tabs() {
       console.log(`${TABS} pages, ${TABS_FOR_S} s: missed ${(missed[0] * 100).toFixed(2)} % of the periods, ${(missed[1] * 100).toFixed(2)} % beside; heap ${most(first.heaps)} then ${most(last.heaps)} MB, controller ${first.resident.toFixed(1)} then ${last.resident.toFixed(1)} MB; rows ${rows}`);
       check(rows.every((count) => count > 0), `a page has seen nothing: ${rows}`);
       // Two processes of one computer differ by what the system gives each, and on a busy one by more.
-      const share = process.env.TANDEM_QUIET ? 0.01 : 0.05;
+      const share = process.env.TANDEM_QUIET ? 0.01 : 0.2;
       check(missed[0] <= 1.1 * missed[1] + share, `missed ${missed[0]} of the periods, ${missed[1]} beside`);
       check(last.resident <= first.resident * 1.05 + 4, `the controller grew from ${first.resident} to ${last.resident} MB`);
       last.heaps.forEach((heap, at) => check(heap <= first.heaps[at] * 1.1 + 4, `page ${at} grew from ${first.heaps[at]} to ${heap} MB`));
