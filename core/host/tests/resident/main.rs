@@ -214,7 +214,7 @@ fn an_abort_that_comes_before_the_drives_are_handed_over_stops_the_job_that_take
 fn on_the_wall_clock_one_thread_lives_through_all_jobs() {
     // What the computer that tests is late with is another test's.
     let (mut machine, registry) = (machine(), registry());
-    machine.max_missed_periods = u32::MAX;
+    (machine.max_missed_periods, machine.max_missed_share) = (u32::MAX, 1.0);
     let mut resident = Resident::attach(machine.clone(), &registry, Clock::Wall).unwrap();
     assert_eq!(resident.enable(false, &mut ()).unwrap().summary.fault, None);
     let text = "F6000\nG1 X2\nX0\nM2\n";

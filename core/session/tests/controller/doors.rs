@@ -91,7 +91,10 @@ fn with_controller_of(
     asked.clock = Clock::Wall;
     asked.listen.unix = Some(socket.clone());
     options(&mut asked);
-    let controller = Controller::open(machine, registry, asked, keeper).unwrap();
+    // How late a busy computer wakes the loop is asked by other tests.
+    let mut machine = machine.clone();
+    (machine.max_missed_periods, machine.max_missed_share) = (u32::MAX, 1.0);
+    let controller = Controller::open(&machine, registry, asked, keeper).unwrap();
     let (end, address) = (controller.ender(), controller.address());
     std::thread::scope(|scope| {
         scope.spawn(move || {
@@ -529,7 +532,10 @@ fn commands_of_the_machine_run_where_it_stands_in_lines_by_hand_and_in_programs(
     std::fs::write(&script, text).unwrap();
     std::fs::set_permissions(&script, std::fs::Permissions::from_mode(0o755)).unwrap();
     let command = format!("{:?}", script.to_str().unwrap());
-    let on = patient(&[("user_commands.M101", &command), ("driver.plugin", "metal")]);
+    let on = machine_with(
+        "mill-3axis.toml",
+        &[("user_commands.M101", &command), ("driver.plugin", "metal")],
+    );
     let mut registry = registry();
     registry
         .register(
@@ -577,15 +583,6 @@ fn commands_of_the_machine_run_where_it_stands_in_lines_by_hand_and_in_programs(
     );
 }
 
-/// A machine of which it is not asked how late a busy computer wakes its loop.
-fn patient(keys: &[(&str, &str)]) -> Machine {
-    let late = [
-        ("loops.max_missed_periods", "1000000"),
-        ("loops.max_missed_share", "1"),
-    ];
-    machine_with("mill-3axis.toml", &[keys, &late[..]].concat())
-}
-
 /// A pipe at `place`: whoever opens it to write waits until somebody reads.
 fn pipe(place: &Path) {
     std::fs::create_dir_all(place.parent().unwrap()).unwrap();
@@ -604,7 +601,7 @@ fn a_disk_that_hangs_under_the_files_of_a_job_holds_no_motion() {
     let trace = |job: &str| folder.path().join(job).join("trace.csv");
     pipe(&trace("000001-mdi"));
     with_controller(
-        &patient(&[]),
+        &machine("mill-3axis.toml"),
         Box::new(NoKeeper),
         |options| options.record = Some(folder.path().to_owned()),
         |socket, _| {
@@ -637,7 +634,7 @@ fn a_full_disk_under_the_files_of_a_job_holds_the_machine_where_its_file_says_so
         std::fs::create_dir_all(trace.parent().unwrap()).unwrap();
         std::os::unix::fs::symlink("/dev/full", &trace).unwrap();
         with_controller(
-            &patient(&[("recorder.on_error", mode)]),
+            &machine_with("mill-3axis.toml", &[("recorder.on_error", mode)]),
             Box::new(NoKeeper),
             |options| options.record = Some(folder.path().to_owned()),
             |socket, _| {
@@ -666,7 +663,7 @@ fn a_full_disk_under_the_files_of_a_job_holds_the_machine_where_its_file_says_so
 fn what_has_come_is_repeated_to_the_bit() {
     let folder = tempfile::tempdir().unwrap();
     let (file, pause) = (folder.path().join("day.jsonl"), Duration::from_millis(3));
-    let on = patient(&[]);
+    let on = machine("mill-3axis.toml");
     let lines: Vec<_> = (1..=40)
         .map(|n| format!("G1 X{} Y{} F3000", n % 7, f64::from(n) / 4.0))
         .collect();
