@@ -279,7 +279,7 @@ export async function many() {
       console.log(`${LINES} lines: drawn in ${seconds.toFixed(1)} s, heap ${heap.toFixed(0)} MB, longest task ${longest.toFixed(0)} ms (${quiet.toFixed(0)} ms before), ${answers} answers, ${(painted / points).toFixed(2)} times painted`);
       check(heap <= 250, `the heap has ${heap} MB`);
       check(answers <= 120, `${answers} answers for ${points} points`);
-      check(painted <= 1.5 * points, `${painted} points painted for ${points}`);
+      check(painted <= 2 * points, `${painted} points painted for ${points}`);
       if (process.env.TANDEM_QUIET) check(seconds <= 4 && longest <= 200, `${seconds} s, ${longest} ms`);
       clean(page);
     }, ["--programs", folder]);

@@ -176,7 +176,7 @@ fn program_with_constants(seed: u64) -> String {
 #[test]
 fn random_programs_overlap_within_limits_and_tolerance() {
     let blocks = AtomicU64::new(0);
-    for_each_seed(
+    let tried = for_each_seed(
         "random_programs_overlap_within_limits_and_tolerance",
         160,
         |seed| {
@@ -195,10 +195,10 @@ fn random_programs_overlap_within_limits_and_tolerance() {
     );
     let judged = blocks.load(Relaxed);
     println!("{judged} blocks judged");
-    let all = ["TANDEM_SEED", "TANDEM_SEEDS"]
-        .iter()
-        .all(|name| std::env::var(name).is_err());
-    assert!(judged >= 20_000 || !all, "{judged} blocks are too few");
+    assert!(
+        tried < 10 || judged >= 100 * tried as u64,
+        "{judged} blocks are too few"
+    );
 }
 
 #[test]

@@ -1,12 +1,13 @@
 //! Tests over many seeds or ticks: a failing one says with which command it is replayed.
 
-/// Tries each of `values`, or the one that the environment `variable` names. `test` is the name of the calling test.
+/// Tries each of `values`, or the one that the environment `variable` names, and gives how many were tried. `test` is the name of the
+/// calling test.
 pub fn for_each<T: std::fmt::Display + std::str::FromStr>(
     variable: &str,
     test: &str,
     values: impl Iterator<Item = T>,
     mut attempt: impl FnMut(&T) -> Result<(), String>,
-) {
+) -> usize {
     let chosen = std::env::var(variable)
         .ok()
         .map(|text| text.parse().ok().expect("it is one of the test's values"));
@@ -18,6 +19,7 @@ pub fn for_each<T: std::fmt::Display + std::str::FromStr>(
         });
     }
     println!("{test}: {} runs", values.len());
+    values.len()
 }
 
 /// Every `n`-th of `values`, beginning with one that is drawn and told; all of them where `TANDEM_EVERY` is set. The gate has not the
@@ -49,7 +51,12 @@ pub fn for_each_tick(
 const FEW_SEEDS: u64 = 10;
 
 /// Tries the seeds 1 to `count`, of many a third; or the one that `TANDEM_SEED` names. `TANDEM_SEEDS` asks for another number of them.
-pub fn for_each_seed(test: &str, count: u64, mut attempt: impl FnMut(u64) -> Result<(), String>) {
+/// Gives how many were tried.
+pub fn for_each_seed(
+    test: &str,
+    count: u64,
+    mut attempt: impl FnMut(u64) -> Result<(), String>,
+) -> usize {
     let asked = std::env::var("TANDEM_SEEDS");
     let asked = asked.map(|text| text.parse().expect("a number of seeds"));
     let one_of = if asked.is_err() && count > FEW_SEEDS {
@@ -60,5 +67,5 @@ pub fn for_each_seed(test: &str, count: u64, mut attempt: impl FnMut(u64) -> Res
     let count = asked.unwrap_or(count);
     println!("{test}: seeds 1 to {count}, or TANDEM_SEED");
     let seeds = some_of(one_of, test, 1..=count);
-    for_each("TANDEM_SEED", test, seeds, |seed| attempt(*seed));
+    for_each("TANDEM_SEED", test, seeds, |seed| attempt(*seed))
 }

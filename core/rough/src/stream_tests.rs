@@ -259,7 +259,8 @@ fn words_act_where_they_stand_and_blocks_are_told_in_their_order() {
 #[test]
 fn behind_an_abort_only_what_the_program_gives_then_is_driven_from_there() {
     for goes_on in [true, false] {
-        let first = (0..9).map(block).chain([event(9)]).collect();
+        // Some of the words wait for their blocks when the machine stops.
+        let first = (0..9).flat_map(|n| [event(n), block(n)]).collect();
         let lists = vec![first, vec![event(20), block(20)], vec![Item::End]];
         let mut rig = Rig::with(lists, |script, _| script.goes_on = goes_on);
         rig.step();
@@ -291,6 +292,50 @@ fn behind_an_abort_only_what_the_program_gives_then_is_driven_from_there() {
             );
         }
     }
+}
+
+/// What waits for room in the ring, and what the planner has emitted in motion, is over too.
+#[test]
+fn behind_a_rest_nothing_counts_that_was_emitted_before() {
+    struct UntilReset {
+        stands: bool,
+    }
+    impl Plans for UntilReset {
+        fn advance(&mut self, duration_s: f64, sink: &mut dyn SegmentSink) -> (f64, bool) {
+            if self.stands {
+                return (0.0, true);
+            }
+            for _ in 0..4 {
+                sink.segment(&Segment::rest(&AxisVector::ZERO, duration_s / 4.0));
+            }
+            (duration_s, false)
+        }
+        fn reset(&mut self, _position: &AxisVector) {
+            self.stands = true;
+        }
+    }
+    let sizes = Sizes {
+        segments: 3,
+        ..Sizes::default()
+    };
+    let script = Script::of(vec![Ok(vec![block(0), Item::End]), Ok(vec![block(1)])]);
+    let (rough, mut fine, _host) = bridge(sizes);
+    let config = RoughConfig::new(ROUGH_PERIOD_S, ROUGH_PERIOD_S);
+    let planner = Box::new(Fake(UntilReset { stands: false }));
+    let mut rough = RoughLoop::new(config, Box::new(script), planner, rough);
+    assert_eq!(rough.step(&mut ()).unwrap(), Progress::Working);
+    assert!(rough.queue.is_waiting_for_room());
+    while fine.segments.pop().is_ok() {}
+    let stop = rest(RestCause::Corrected);
+    fine.status.program_time_s.store(stop.program_time_s);
+    fine.rests.push(stop).unwrap();
+    assert_eq!(rough.step(&mut ()).unwrap(), Progress::Done);
+    // The program was over: it is not asked for more.
+    let Ok(Queued::Event(event)) = fine.segments.pop() else {
+        panic!("something was left in the queue");
+    };
+    assert_eq!(event.kind, EventKind::ProgramEnd);
+    assert!(fine.segments.pop().is_err());
 }
 
 #[test]
