@@ -2,11 +2,11 @@
 
 use tandem_gcode::{Input, InputMode, InputWait, Item};
 use tandem_rings::RoughEnd;
-use tandem_sdk::{Accepted, Edge, Event, EventKind, NurbsData, Planner};
+use tandem_sdk::{Accepted, AxisLimits, Edge, Event, EventKind, NurbsData, Planner};
 
 use crate::Observer;
 use crate::depth::QueueDepth;
-use crate::gather::Gathering;
+use crate::gather::{Gathering, Slowness};
 use crate::queue::Queue;
 use crate::seams::{ROUNDING, Seams};
 use crate::source::Source;
@@ -32,6 +32,8 @@ pub struct RoughConfig {
     pub depth_factor: f64,
     /// Steps between segments up to these count as none: of velocity, mm/s, and of acceleration, mm/s².
     pub seam_rounding: [f64; 2],
+    /// How long a sender's lines are gathered follows from it.
+    slowness: Slowness,
 }
 
 impl RoughConfig {
@@ -44,7 +46,14 @@ impl RoughConfig {
             awaits_drives: false,
             depth_factor: 1.0,
             seam_rounding: ROUNDING,
+            slowness: Slowness::NONE,
         }
+    }
+
+    /// Makes the machine move only when as much has come from a sender as it needs, with a linear axis of these limits, to get up to
+    /// speed and down again. Called for each of them. Host.
+    pub fn gather_for(&mut self, limits: &AxisLimits) {
+        self.slowness.count(limits);
     }
 
     /// Makes steps count of which samples of the fine period show a part of what an axis of these limits may: acceleration,
@@ -174,7 +183,7 @@ impl RoughLoop {
             edge_awaited: false,
             awaits_more: false,
             has_room: false,
-            gathering: Gathering::default(),
+            gathering: Gathering::new(config.slowness),
             line: 0,
             last_block: 0,
             done: false,

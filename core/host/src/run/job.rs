@@ -108,8 +108,11 @@ impl Made {
         let mut rough_config = RoughConfig::new(machine.rough_period_s, machine.fine_period_s);
         rough_config.advance_s = parts::advance_s(machine.rough_period_s, depth_s, segments);
         rough_config.awaits_drives = true;
-        for limits in config.limits.axes() {
+        for (axis, limits) in config.limits.axes().iter().enumerate() {
             rough_config.count_steps_of(limits.acceleration_mm_per_s2, limits.jerk_mm_per_s3);
+            if !machine.axes.is_rotary(axis) {
+                rough_config.gather_for(limits);
+            }
         }
         let job = Job {
             rough: RoughLoop::new(rough_config, source, planner, rough_end),

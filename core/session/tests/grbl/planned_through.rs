@@ -23,6 +23,31 @@ fn slow_s(trace: &Trace, feed_mm_per_s: f64) -> Vec<f64> {
 
 #[test]
 fn a_sender_that_never_fills_the_planner_makes_no_rests() {
+    planned_through("mill-3axis.toml");
+}
+
+#[test]
+fn nor_does_it_where_jerk_is_limited() {
+    planned_through("mill-3axis-smooth.toml");
+}
+
+/// An acceleration, and a jerk that builds it up in a tenth of a second or less, the same for the axes that move.
+fn drawn_limits(random: &mut Random) -> Vec<(String, String)> {
+    let acceleration = random.between(300.0, 3000.0);
+    let jerk = acceleration / random.between(0.01, 0.1);
+    println!("{acceleration} mm/s², {jerk} mm/s³");
+    let of_axis = |axis: &str| {
+        [
+            ("acceleration_mm_per_s2", acceleration),
+            ("jerk_mm_per_s3", jerk),
+        ]
+        .map(|(key, value)| (format!("axes.{axis}.max_{key}"), value.to_string()))
+    };
+    ["x", "y"].into_iter().flat_map(of_axis).collect()
+}
+
+/// Streams a slow sender's lines to an example's machine: one job, no slower than a tenth of the feed on the way, and as long as a run.
+fn planned_through(example: &str) {
     let seed = std::env::var("TANDEM_SEED").map_or(1, |seed| seed.parse().unwrap());
     println!("TANDEM_SEED={seed}");
     let mut random = Random::new(seed);
@@ -33,7 +58,12 @@ fn a_sender_that_never_fills_the_planner_makes_no_rests() {
         .map(|line| format!("{line}\n"))
         .collect();
     let text = lines.concat();
-    let machine = machine("mill-3axis.toml", &[]);
+    let limits = drawn_limits(&mut random);
+    let limits: Vec<_> = limits
+        .iter()
+        .map(|(key, value)| (&**key, &**value))
+        .collect();
+    let machine = machine(example, &limits);
     let alone_s = alone_s(&machine, &text);
     // 100 lines are driven in a second; six fit in 127 bytes.
     let every = 5 + random.below(26);

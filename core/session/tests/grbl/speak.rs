@@ -24,7 +24,11 @@ pub fn machine(name: &str, sets: &[(&str, &str)]) -> Machine {
 
 pub fn registry() -> Registry {
     let mut registry = Registry::default();
-    for plugin in [tandem_look_ahead::PLUGIN, tandem_sim::PLUGIN] {
+    for plugin in [
+        tandem_look_ahead::PLUGIN,
+        tandem_smooth::PLUGIN,
+        tandem_sim::PLUGIN,
+    ] {
         registry.register(plugin).unwrap();
     }
     registry
