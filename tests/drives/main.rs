@@ -6,6 +6,7 @@ mod cable;
 #[path = "../counting_allocator.rs"]
 mod counting_allocator;
 mod double;
+mod eight;
 mod ethercat;
 mod every_frame;
 #[path = "../../core/host/tests/drives/four_axes.rs"]

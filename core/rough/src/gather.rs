@@ -135,3 +135,108 @@ impl Gathering {
         !self.moves && self.blocks > 0 && has_time
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tandem_sdk::AxisVector;
+
+    const PERIOD_S: f64 = 1.0 / 64.0;
+
+    /// Stops from 50 mm/s take 0.1 s, so 0.378 s at the feed are enough.
+    fn gathering() -> Gathering {
+        let mut slowness = Slowness::NONE;
+        for (speed, acceleration, jerk) in [(100.0, 1000.0, 2e4), (60.0, 2000.0, 4e4)] {
+            slowness.count(&AxisLimits {
+                feed_mm_per_s: speed / 2.0,
+                rapid_mm_per_s: speed,
+                acceleration_mm_per_s2: acceleration,
+                jerk_mm_per_s3: jerk,
+                ..AxisLimits::unlimited()
+            });
+        }
+        Gathering::new(slowness)
+    }
+
+    /// A block of this length, mm, at this feed, mm/s.
+    fn block(length_mm: f64, feed_mm_per_s: f64) -> Block {
+        Block {
+            length_mm,
+            feed_mm_per_s,
+            ..Block::at(AxisVector::ZERO)
+        }
+    }
+
+    /// So many blocks of 20 ms at 50 mm/s `at_once`, `every` so many periods, up to a `count`; how many have come when nothing is waited
+    /// for any more, and in which period that is.
+    fn blocks_gathered((at_once, every): (u32, u32), count: u32) -> (u32, u32) {
+        let mut gathering = gathering();
+        let mut came = 0;
+        for period in 0..1000 {
+            gathering.pass(PERIOD_S);
+            if period % every == 0 && came < count {
+                (0..at_once).for_each(|_| gathering.accepted(&block(1.0, 50.0)));
+                came += at_once;
+            }
+            if !gathering.goes_on(PERIOD_S) {
+                return (came, period);
+            }
+        }
+        panic!("it waits for ever");
+    }
+
+    #[test]
+    fn it_waits_until_what_has_come_lasts_for_three_stops() {
+        assert_eq!(blocks_gathered((1, 1), u32::MAX), (19, 18));
+    }
+
+    #[test]
+    fn a_slower_sender_is_waited_for_as_long_as_that() {
+        assert_eq!(blocks_gathered((2, 3), u32::MAX), (18, 25));
+    }
+
+    #[test]
+    fn a_sender_that_pauses_is_not_waited_for() {
+        let (came, period) = blocks_gathered((1, 1), 5);
+        assert_eq!((came, period), (5, 4 + 7));
+    }
+
+    #[test]
+    fn a_line_that_is_alone_waits_for_one_period() {
+        assert_eq!(blocks_gathered((1, 1), 1), (1, 1));
+    }
+
+    #[test]
+    fn nothing_is_waited_for_before_a_line_and_once_the_machine_moves() {
+        let mut gathering = gathering();
+        gathering.pass(PERIOD_S);
+        assert!(!gathering.may_wait(PERIOD_S));
+        gathering.accepted(&block(0.5, 50.0));
+        gathering.emitted(false);
+        assert!(
+            gathering.may_wait(PERIOD_S),
+            "what is emitted is too little to move by"
+        );
+        gathering.emitted(true);
+        gathering.emitted(false);
+        assert!(!gathering.may_wait(PERIOD_S));
+        gathering.restart();
+        gathering.accepted(&block(0.5, 50.0));
+        assert!(
+            gathering.may_wait(PERIOD_S),
+            "all of it is driven, and more has come"
+        );
+    }
+
+    #[test]
+    fn a_feed_that_no_axis_reaches_is_that_of_the_fastest() {
+        let mut gathering = gathering();
+        gathering.accepted(&block(10.0, 1e6));
+        assert_eq!(
+            (gathering.at_feed_s, gathering.max_feed_mm_per_s),
+            (0.1, 100.0)
+        );
+        gathering.accepted(&block(0.0, 1e6));
+        assert_eq!(gathering.at_feed_s, 0.1, "a dwell has no feed");
+    }
+}

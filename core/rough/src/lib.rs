@@ -14,6 +14,7 @@ mod source;
 mod window;
 
 pub use depth::QueueDepth;
+pub use gather::Slowness;
 pub use policy::{BlockPolicy, Tuned, WINDOW_BLOCKS};
 pub use rough::{Progress, RoughConfig, RoughError, RoughLoop};
 pub use source::Source;

@@ -32,8 +32,8 @@ pub struct RoughConfig {
     pub depth_factor: f64,
     /// Steps between segments up to these count as none: of velocity, mm/s, and of acceleration, mm/s².
     pub seam_rounding: [f64; 2],
-    /// How long a sender's lines are gathered follows from it.
-    slowness: Slowness,
+    /// How slowly the linear axes change their speed: how long a sender's lines are gathered follows from it.
+    pub slowness: Slowness,
 }
 
 impl RoughConfig {

@@ -68,7 +68,7 @@ impl Keeper for SlowDisk {
 }
 
 /// What `clients` do at a controller of `machine`, which runs until they are done.
-fn with_controller(
+pub fn with_controller(
     machine: &Machine,
     keeper: Box<dyn Keeper>,
     options: impl FnOnce(&mut Options),
@@ -115,14 +115,14 @@ impl<F: Fn()> Drop for Ender<F> {
 }
 
 /// A client, and what it was told that it has not looked at.
-struct Client<S> {
+pub struct Client<S> {
     lines: BufReader<S>,
     next: u64,
-    aside: Vec<Value>,
+    pub aside: Vec<Value>,
 }
 
 impl Client<UnixStream> {
-    fn at(socket: &Path) -> Self {
+    pub fn at(socket: &Path) -> Self {
         let stream = UnixStream::connect(socket).unwrap();
         stream.set_read_timeout(Some(NEVER)).unwrap();
         let mut client = Self::over(stream);
@@ -131,7 +131,7 @@ impl Client<UnixStream> {
     }
 
     /// One that holds the lease of a machine that is ready.
-    fn in_control(socket: &Path) -> Self {
+    pub fn in_control(socket: &Path) -> Self {
         let mut client = Self::at(socket);
         client.ok("lease", json!({ "how": "take" }));
         client.until_state("ready");
@@ -154,7 +154,7 @@ impl<S: Read + Write> Client<S> {
         }
     }
 
-    fn hear(&mut self) -> Value {
+    pub fn hear(&mut self) -> Value {
         let mut line = String::new();
         self.lines.read_line(&mut line).unwrap();
         serde_json::from_str(&line).unwrap_or_else(|e| panic!("{line:?}: {e}"))
@@ -170,7 +170,7 @@ impl<S: Read + Write> Client<S> {
     }
 
     /// The answer to `id`, or the first that `is` it.
-    fn wait(&mut self, is: impl Fn(&Value) -> bool) -> Value {
+    pub fn wait(&mut self, is: impl Fn(&Value) -> bool) -> Value {
         if let Some(at) = self.aside.iter().position(&is) {
             return self.aside.remove(at);
         }
@@ -192,7 +192,7 @@ impl<S: Read + Write> Client<S> {
         self.answer(id)
     }
 
-    fn ok(&mut self, request: &str, with: Value) -> Value {
+    pub fn ok(&mut self, request: &str, with: Value) -> Value {
         let answer = self.ask(request, with);
         assert!(answer.get("ok").is_some(), "{request}: {answer}");
         answer["ok"].clone()

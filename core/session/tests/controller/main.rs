@@ -9,6 +9,7 @@ mod scale;
 mod seeing;
 mod support;
 mod truth;
+mod watched;
 
 use serde_json::{Value, json};
 use tandem_gcode::Program;

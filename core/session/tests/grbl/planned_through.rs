@@ -4,7 +4,9 @@
 use tandem_oracle::{Row, Trace};
 use tandem_rig::Random;
 
-use crate::speak::{Streamer, alone_s, chords, jobs, machine, serve_recorded};
+use crate::speak::{
+    Streamer, alone_s, assert_as_long_as_a_run, chords, jobs, machine, serve_recorded,
+};
 
 /// Times at which the machine slows down to a tenth of its feed between the first and the last motion, s.
 fn slow_s(trace: &Trace, feed_mm_per_s: f64) -> Vec<f64> {
@@ -80,9 +82,5 @@ fn planned_through(example: &str) {
         slow_s.is_empty(),
         "lines every {every} ms: it slows down at {slow_s:?} s"
     );
-    let ratio = jobs[0]["time_s"].as_f64().unwrap() / alone_s;
-    assert!(
-        ratio <= 1.05,
-        "lines every {every} ms: {ratio} of the run's time"
-    );
+    assert_as_long_as_a_run(&jobs, alone_s, &format!("lines every {every} ms"));
 }

@@ -7,7 +7,7 @@ use tandem_machine::Machine;
 use tandem_oracle::{Options, Trace, judge};
 use tandem_rig::Random;
 
-use crate::speak::{Streamer, alone_s, field, jobs, serve_recorded};
+use crate::speak::{Streamer, alone_s, assert_as_long_as_a_run, field, jobs, serve_recorded};
 
 /// Letters of a machine, and which of them turn.
 const AXES: [&str; 5] = ["XYZ", "XY", "XYZA", "XZC", "XYZAB"];
@@ -199,11 +199,7 @@ fn any_machine_drives_what_a_sender_sends_as_it_would_a_file() {
             1,
             "it is planned through with {budget} bytes on the way: {jobs:?}\n{sent}"
         );
-        let ratio = jobs[0]["time_s"].as_f64().unwrap() / alone_s;
-        assert!(
-            ratio <= 1.05,
-            "{budget} bytes on the way: {ratio} of the run's time"
-        );
+        assert_as_long_as_a_run(&jobs, alone_s, &format!("{budget} bytes on the way"));
 
         let jobs = std::fs::read_dir(&record)
             .unwrap()

@@ -356,3 +356,17 @@ pub fn jobs(told: &[Value]) -> Vec<&Value> {
         .map(|told| &told["told"]["job"])
         .collect()
 }
+
+/// How long jobs took together, s.
+pub fn took_s(jobs: &[&Value]) -> f64 {
+    jobs.iter().map(|job| job["time_s"].as_f64().unwrap()).sum()
+}
+
+/// Jobs take no more than a twentieth longer than a run of the same lines, which takes `alone_s`; `how` they came stands in the failure.
+pub fn assert_as_long_as_a_run(jobs: &[&Value], alone_s: f64, how: &str) {
+    let ratio = took_s(jobs) / alone_s;
+    assert!(
+        ratio <= 1.05,
+        "{how}: {ratio} of the run's time, {alone_s} s"
+    );
+}
