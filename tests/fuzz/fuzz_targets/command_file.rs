@@ -1,21 +1,4 @@
-//! Any bytes as a command file: what is read is in order, within what the machine plans for, and written as it is read.
+//! `tandem_readers::command_file`, led by coverage.
 #![no_main]
 
-use libfuzzer_sys::fuzz_target;
-use tandem_host::parse_commands;
-
-const MAX_FEED_RATIO: f64 = 1.2;
-
-fuzz_target!(|text: &str| {
-    let commands = match parse_commands("commands.csv", text, MAX_FEED_RATIO) {
-        Ok(commands) => commands,
-        Err(causes) => {
-            assert!(causes.lines().all(|cause| cause.starts_with("commands.csv:") || cause.starts_with("and ")));
-            return;
-        }
-    };
-    assert!(commands.is_sorted_by_key(|timed| timed.tick));
-    assert!(commands.iter().all(|timed| timed.command.check(MAX_FEED_RATIO).is_ok()));
-    let written: Vec<String> = commands.iter().map(ToString::to_string).collect();
-    assert_eq!(parse_commands("written", &written.join("\n"), MAX_FEED_RATIO).as_ref(), Ok(&commands));
-});
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| tandem_readers::command_file::judge(bytes));
