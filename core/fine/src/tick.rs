@@ -36,16 +36,13 @@ use crate::config::FineConfig;
 use crate::cursor::Cursor;
 use crate::edge::EdgeWatch;
 use crate::fault::{Fault, FaultKind};
-use crate::governor::Governor;
 use crate::guard::Guard;
 use crate::history::History;
-use crate::horizon::Horizon;
 use crate::outputs::Outputs;
-use crate::period_points::PeriodPoints;
 use crate::ramp::Ramp;
-use crate::slowdowns::{LineEnd, Slowdowns};
 use crate::state::{self, Input};
 use attach::Attach;
+use govern::PlanFollower;
 use hand_over::HandOver;
 use joints::Lead;
 use keep_alive::KeepAlive;
@@ -102,14 +99,9 @@ pub struct FineLoop {
     requests: Consumer<StrategyRequest>,
     rests: Producer<Rest>,
     ratio: StrategyRatio,
-    cursor: Cursor,
-    points: PeriodPoints,
-    horizon: Horizon,
-    slowdowns: Slowdowns,
-    line_end: LineEnd,
+    plan: PlanFollower,
     /// Something has moved since the last hold between two lines.
     line_moves: bool,
-    governor: Governor,
     guard: Guard,
     /// What the drives are sent beyond the axes' coordinates: homing has found it, mm or rad per joint.
     offset: AxisVector,
@@ -128,7 +120,6 @@ pub struct FineLoop {
     phase: Phase,
     state: MachineState,
     queue: QueueWatch,
-    recovering: bool,
     tick: u64,
     attach: Attach,
     setpoint: Setpoint,
@@ -157,7 +148,6 @@ impl FineLoop {
         driver: Box<dyn Driver>,
         kinematics: Option<Box<dyn Kinematics>>,
     ) -> Self {
-        let (limits, lanes) = (&config.limits.axes, config.lane_count());
         let judges_following = config
             .max_following_error_mm
             .0
@@ -177,13 +167,8 @@ impl FineLoop {
             requests: end.requests,
             rests: end.rests,
             ratio: StrategyRatio::new(end.ratios, config.ratio_periods),
-            cursor: Cursor::new(end.segments, &config.position),
-            points: PeriodPoints::new(limits, lanes),
-            horizon: Horizon::new(limits, lanes, config.period_s),
-            slowdowns: Slowdowns::new(),
-            line_end: LineEnd::default(),
+            plan: PlanFollower::new(config, Cursor::new(end.segments, &config.position)),
             line_moves: false,
-            governor: Governor::new(limits, lanes, config.period_s),
             guard: Guard::new(config),
             offset: AxisVector::ZERO,
             edge: EdgeWatch::default(),
@@ -199,7 +184,6 @@ impl FineLoop {
             phase: Phase::Waiting,
             state: MachineState::Fault,
             queue: QueueWatch::default(),
-            recovering: false,
             tick: 0,
             attach: Attach::new(config),
             setpoint: Setpoint::default(),
@@ -232,7 +216,7 @@ impl FineLoop {
         let ended = self.outputs.ended;
         self.release.had_ended = ended;
         let waiting = matches!(self.phase, Phase::Waiting);
-        let before_mm = self.cursor.path_mm();
+        let before_mm = self.plan.cursor.path_mm();
         let (position, input) = self.next_position();
         let all_hold = self.exchange(&position);
         self.state = state::next(state::next(self.state, self.drives(all_hold)), input);
@@ -240,7 +224,7 @@ impl FineLoop {
         let recorded =
             (self.outputs.unhomed == 0 || self.config.record_drives) && self.handed_over() == 0;
         if started && recorded && !ended && !self.outputs.ended {
-            let feed = (self.cursor.path_mm() - before_mm) / self.config.period_s;
+            let feed = (self.plan.cursor.path_mm() - before_mm) / self.config.period_s;
             self.publish(&position, feed);
         }
         self.keep_switched();
@@ -261,11 +245,7 @@ impl FineLoop {
             self.attach = Attach::again(self.feedback.position);
             (self.fault, self.plugin_error, self.lead) = (None, None, Lead::Axes);
             self.release = Release::default();
-            self.governor = Governor::new(
-                &self.config.limits.axes,
-                self.config.lane_count(),
-                self.config.period_s,
-            );
+            self.plan.forget_rate(&self.config);
             self.progress = Progress::new(&self.config);
             self.forget_roles();
             self.phase = Phase::Waiting;
@@ -374,9 +354,9 @@ impl FineLoop {
         if self.given.abort || self.is_jog_let_go() {
             return self.end_epoch(Stop::abort());
         }
-        let of_this_epoch = self.cursor.epoch() == 0
-            || (self.depth.is_of(self.cursor.epoch()) && self.cursor.drop_older());
-        if of_this_epoch && self.depth.may_start(self.cursor.program_time_s()) {
+        let of_this_epoch = self.plan.cursor.epoch() == 0
+            || (self.depth.is_of(self.plan.cursor.epoch()) && self.plan.cursor.drop_older());
+        if of_this_epoch && self.depth.may_start(self.plan.cursor.program_time_s()) {
             self.phase = Phase::Following;
         }
         Input::Rest
@@ -406,7 +386,7 @@ impl FineLoop {
         self.fault = Some(Fault {
             kind,
             tick: self.tick,
-            line: self.cursor.segment().line,
+            line: self.plan.cursor.segment().line,
         });
         self.phase = Phase::Ramping(Ramp::new(&self.config, &self.guard));
     }

@@ -158,17 +158,17 @@ impl FineLoop {
         let (ratio, feed_override) = (self.ratios_in_force().feed, self.permitted_override());
         let sample = || Sample {
             tick: self.tick,
-            block: self.cursor.segment().block,
-            line: self.cursor.segment().line,
+            block: self.plan.cursor.segment().block,
+            line: self.plan.cursor.segment().line,
             state: self.state,
             command,
             feedback,
             speed: self.feedback.speed,
             current_a: self.feedback.current_a,
             feed_mm_per_s,
-            end_feed_mm_per_s: self.governor.sigma() * self.cursor.path_speed_mm_per_s(),
-            programmed_feed_mm_per_s: self.cursor.segment().feed_mm_per_s,
-            sigma: self.governor.sigma(),
+            end_feed_mm_per_s: self.plan.governor.sigma() * self.plan.cursor.path_speed_mm_per_s(),
+            programmed_feed_mm_per_s: self.plan.cursor.segment().feed_mm_per_s,
+            sigma: self.plan.governor.sigma(),
             ratio,
             feed_override,
             spindle_rad_per_s: self.feedback.spindle_rad_per_s,
@@ -209,7 +209,7 @@ impl FineLoop {
     pub(super) fn keep_switched(&mut self) {
         let switched = self.switched();
         if switched != self.left.switched {
-            let segment = self.cursor.segment();
+            let segment = self.plan.cursor.segment();
             self.left = Left {
                 tick: self.tick,
                 block: segment.block,
@@ -222,15 +222,17 @@ impl FineLoop {
     pub(super) fn report(&self) {
         let status = &self.status;
         status.tick.store(self.tick, Relaxed);
-        status.program_time_s.store(self.cursor.program_time_s());
+        status
+            .program_time_s
+            .store(self.plan.cursor.program_time_s());
         // Off the plan nothing is fed, as in the samples: σ keeps what it was when the fault came.
         let feed_mm_per_s = if self.fault.is_some() {
             0.0
         } else {
-            self.governor.sigma() * self.cursor.path_speed_mm_per_s()
+            self.plan.governor.sigma() * self.plan.cursor.path_speed_mm_per_s()
         };
         status.feed_mm_per_s.store(feed_mm_per_s);
-        status.line.store(self.cursor.segment().line, Relaxed);
+        status.line.store(self.plan.cursor.segment().line, Relaxed);
         status.state.store(self.state as u32, Relaxed);
         status.inputs.store(self.feedback.inputs, Relaxed);
         status
@@ -251,9 +253,10 @@ impl FineLoop {
         status
             .enabling
             .store(!self.attach.is_done() && self.fault.is_none(), Relaxed);
-        status
-            .idle
-            .store(self.cursor.is_resting() && self.cursor.is_last(), Relaxed);
+        status.idle.store(
+            self.plan.cursor.is_resting() && self.plan.cursor.is_last(),
+            Relaxed,
+        );
         status.counts.store(&self.counters);
     }
 }

@@ -5,6 +5,7 @@ use std::sync::atomic::Ordering::Relaxed;
 use tandem_rings::Queued;
 use tandem_sdk::{AxisVector, EventKind};
 
+use super::govern::{Ratios, Request};
 use super::spindle::SpinUp;
 use super::{FineLoop, Phase};
 use crate::config::GuardMode;
@@ -35,14 +36,14 @@ impl FineLoop {
             return self.next_position();
         }
         self.cause = self.cause_of(ask);
-        if self.cursor.is_resting() {
-            self.governor.jump(if ask == Ask::Run {
-                self.max_rate()
+        if self.plan.cursor.is_resting() {
+            self.plan.governor.jump(if ask == Ask::Run {
+                self.depth.max_rate.load()
             } else {
                 0.0
             });
         }
-        if self.governor.sigma() == 0.0
+        if self.plan.governor.sigma() == 0.0
             && ask == Ask::Hold
             && self.controls.soft_fault.load(Relaxed)
         {
@@ -51,7 +52,7 @@ impl FineLoop {
         }
         if let Some(stop) = self
             .stop
-            .filter(|_| self.governor.sigma() == 0.0 || self.cursor.is_resting())
+            .filter(|_| self.plan.governor.sigma() == 0.0 || self.plan.cursor.is_resting())
         {
             return (self.stand(), self.end_epoch(stop));
         }
@@ -65,7 +66,7 @@ impl FineLoop {
         }
         let delta_s = self.govern(ask);
         let waits = self.waits();
-        let reached = self.cursor.advance(delta_s, |queued| {
+        let reached = self.plan.cursor.advance(delta_s, |queued| {
             let event = match queued {
                 Queued::Segment { segment, .. } => {
                     return self.spin_up.is_awaited() && is_cut(segment);
@@ -86,12 +87,67 @@ impl FineLoop {
         });
         self.watch_progress(ask, reached);
         self.begin_edge();
-        let mut position = self.cursor.position();
+        let mut position = self.plan.cursor.position();
         self.add_joints(&mut position);
         let checked = self.guard.check(&position, self.outputs.unhomed);
         self.counters.jerk_relaxed_samples += u64::from(checked.relaxed);
         let position = self.let_pass(position, &checked);
         (position, self.input(ask, reached))
+    }
+
+    /// Chooses the rate for this period; gives the program time that passes, s.
+    fn govern(&mut self, ask: Ask) -> f64 {
+        let governed = self.plan.govern(Request {
+            ask,
+            ratios: self.ratios_in_force(),
+            single_block: self.given.single_block,
+            max_rate: self.depth.max_rate.load(),
+            stop_deceleration_mm_per_s2: self.depth.stop_deceleration_mm_per_s2.load(),
+        });
+        self.progress.ask(governed.least_asked);
+        self.counters.queue_limited_samples += u64::from(governed.is_queue_limited);
+        self.counters.governed_samples += u64::from(governed.is_unasked);
+        if governed.is_jerk_relaxed {
+            self.guard.relax_jerk();
+        }
+        if governed.holds {
+            self.controls.hold.store(true, Relaxed);
+        }
+        governed.delta_s
+    }
+
+    /// The operator's feed override, where the program permits it.
+    pub(super) fn permitted_override(&self) -> f64 {
+        if self.outputs.override_permitted {
+            self.given.feed_override
+        } else {
+            1.0
+        }
+    }
+
+    pub(super) fn ratios_in_force(&self) -> Ratios {
+        let operator = self.permitted_override();
+        let [feed, mean_feed] = if self.outputs.adaptive_permitted {
+            // What is above 1 is in the ratio already, within the strategy's own bounds.
+            let operator = if self.config.strategy_takes_override {
+                operator.min(1.0)
+            } else {
+                operator
+            };
+            [self.ratio.now(), self.ratio.mean()].map(|ratio| operator * ratio)
+        } else {
+            [operator; 2]
+        };
+        let rapid = if self.outputs.override_permitted {
+            self.given.rapid_override.min(1.0)
+        } else {
+            1.0
+        };
+        Ratios {
+            feed,
+            mean_feed,
+            rapid,
+        }
     }
 
     /// The sample of a period that leaves the axes where they are; the guard knows from it that they stand.
@@ -140,9 +196,9 @@ impl FineLoop {
         }
         let starves = self.queue.look(
             &self.depth,
-            self.cursor.program_time_s(),
-            self.governor.sigma(),
-            self.cursor.path_speed_mm_per_s(),
+            self.plan.cursor.program_time_s(),
+            self.plan.governor.sigma(),
+            self.plan.cursor.path_speed_mm_per_s(),
             self.config.period_s,
         );
         self.counters.starvations += u64::from(starves);
@@ -165,7 +221,7 @@ impl FineLoop {
             (Phase::Faulted, _) => Input::Stopped,
             (_, Ask::Hold | Ask::Stop) => Input::Hold,
             (_, Ask::Starve) => Input::Starve,
-            _ if reached == Reached::Rest && self.cursor.is_last() => Input::Rest,
+            _ if reached == Reached::Rest && self.plan.cursor.is_last() => Input::Rest,
             _ => Input::Run,
         }
     }

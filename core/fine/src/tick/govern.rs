@@ -6,14 +6,17 @@ use crate::governor::tuning::{
 };
 use tandem_rings::STOP_SHARE;
 
-use super::FineLoop;
 use super::follow::Ask;
-use crate::config::GuardMode;
+use crate::config::{FineConfig, GuardMode};
+use crate::cursor::Cursor;
 use crate::governor::{Aim, Governor};
+use crate::horizon::Horizon;
 use crate::law::Along;
-use crate::slowdowns::Slowdown;
+use crate::period_points::PeriodPoints;
+use crate::slowdowns::{LineEnd, Slowdown, Slowdowns};
 
 /// The feed ratios that count now.
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Ratios {
     /// At the end of the period.
     pub(super) feed: f64,
@@ -22,7 +25,75 @@ pub(super) struct Ratios {
     pub(super) rapid: f64,
 }
 
-/// What a period is asked for.
+/// What a fine period is asked for, and what the queue allows in it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Request {
+    pub(super) ask: Ask,
+    pub(super) ratios: Ratios,
+    /// The machine is to rest at the end of every line.
+    pub(super) single_block: bool,
+    /// The highest rate that the queue allows.
+    pub(super) max_rate: f64,
+    /// Path deceleration that every queued segment leaves, mm/s².
+    pub(super) stop_deceleration_mm_per_s2: f64,
+}
+
+/// What was chosen for a fine period.
+#[derive(Clone, Copy, Debug)]
+#[allow(clippy::struct_excessive_bools)] // independent facts of one period
+pub(super) struct Governed {
+    /// Program time that passes, s.
+    pub(super) delta_s: f64,
+    /// The least rate that ratios, places ahead and the queue have asked for.
+    pub(super) least_asked: f64,
+    /// Jerk goes beyond its limit: velocity and acceleration are kept.
+    pub(super) is_jerk_relaxed: bool,
+    /// The rate is below 1 because the queue is not deep enough for more.
+    pub(super) is_queue_limited: bool,
+    /// The rate is below 1 though nothing asked for that: the plan is beyond its limits.
+    pub(super) is_unasked: bool,
+    /// The end of a line is reached, or was passed: the machine is to rest here until the operator resumes.
+    pub(super) holds: bool,
+}
+
+impl Governed {
+    /// What a period that nothing has asked anything of yet has chosen.
+    const NOTHING: Self = Self {
+        delta_s: 0.0,
+        least_asked: 1.0,
+        is_jerk_relaxed: false,
+        is_queue_limited: false,
+        is_unasked: false,
+        holds: false,
+    };
+}
+
+/// The plan as it is followed: where the machine is in it, and how fast program time passes. Knows neither drives nor operator.
+#[derive(Debug)]
+pub(super) struct PlanFollower {
+    pub(super) cursor: Cursor,
+    pub(super) governor: Governor,
+    pub(super) points: PeriodPoints,
+    pub(super) horizon: Horizon,
+    slowdowns: Slowdowns,
+    pub(super) line_end: LineEnd,
+    /// σ is below 1, or was, because something asked for it.
+    recovering: bool,
+    /// What the present period is asked for, and what has been chosen for it so far.
+    pub(super) request: Request,
+    pub(super) chosen: Governed,
+    pub(super) period_s: f64,
+    /// Order of the limits that the plan keeps.
+    pub(super) order: u32,
+    /// Number of axes that are looked at, and which of them are linear.
+    axes: (usize, u32),
+    /// The plan is made for this ratio of the programmed feeds.
+    max_feed_ratio: f64,
+    /// Samples beyond the limits are sent, not slowed down.
+    sends_all: bool,
+}
+
+/// The rates that a period is asked for.
 struct Asked {
     /// Rate at its end.
     at_end: f64,
@@ -48,27 +119,78 @@ const REST_ROUNDS: u32 = 8;
 /// Halvings in which it is sought where these do not settle.
 const REST_HALVINGS: u32 = 24;
 
-impl FineLoop {
-    /// Chooses the rate for this period; gives the program time that passes, s.
-    pub(super) fn govern(&mut self, ask: Ask) -> f64 {
+impl PlanFollower {
+    /// At rest at the start of an empty queue. Host; allocates.
+    pub(super) fn new(config: &FineConfig, cursor: Cursor) -> Self {
+        let (limits, axes) = (&config.limits.axes, config.lane_count());
+        Self {
+            cursor,
+            governor: Governor::new(limits, axes, config.period_s),
+            points: PeriodPoints::new(limits, axes),
+            horizon: Horizon::new(limits, axes, config.period_s),
+            slowdowns: Slowdowns::new(),
+            line_end: LineEnd::default(),
+            recovering: false,
+            request: Request {
+                ask: Ask::Hold,
+                ratios: Ratios {
+                    feed: 1.0,
+                    mean_feed: 1.0,
+                    rapid: 1.0,
+                },
+                single_block: false,
+                max_rate: 1.0,
+                stop_deceleration_mm_per_s2: f64::INFINITY,
+            },
+            chosen: Governed::NOTHING,
+            period_s: config.period_s,
+            order: config.order,
+            axes: (axes, config.linear),
+            max_feed_ratio: config.max_feed_ratio,
+            // Under `count` everything is sent: forms that break limits on purpose are not slowed.
+            sends_all: config.guard == GuardMode::Count,
+        }
+    }
+
+    /// Program time passes at its own rate again, as nothing moves. Host; allocates.
+    pub(super) fn forget_rate(&mut self, config: &FineConfig) {
+        self.governor = Governor::new(&config.limits.axes, self.axes.0, self.period_s);
+    }
+
+    /// Forgets what lies ahead in the queue: it counts no more.
+    pub(super) fn forget_ahead(&mut self) {
+        self.slowdowns.clear();
+        self.line_end.forget();
+    }
+
+    /// Chooses the rate for this period.
+    pub(super) fn govern(&mut self, request: Request) -> Governed {
+        self.request = request;
+        self.chosen = Governed::NOTHING;
+        self.chosen.delta_s = self.choose();
+        self.chosen
+    }
+
+    /// Chooses the rate; gives the program time that passes, s.
+    fn choose(&mut self) -> f64 {
+        let Request {
+            ask, mut ratios, ..
+        } = self.request;
         // While slowing down no more program time passes than at the present rate: what lies beyond does not count.
-        let most = if ask == Ask::Run || self.config.order >= 3 {
+        let most = if ask == Ask::Run || self.order >= 3 {
             1.0
         } else {
             self.governor.sigma()
         };
-        self.cursor
-            .scan(most * self.config.period_s, &mut self.points);
-        let mut ratios = self.ratios_in_force();
-        self.ask_for_rate((ratios.feed / self.config.max_feed_ratio).min(ratios.rapid));
-        let below = ratios.feed < self.config.max_feed_ratio;
-        if self.config.order >= 3 {
+        self.cursor.scan(most * self.period_s, &mut self.points);
+        self.ask_for_rate((ratios.feed / self.max_feed_ratio).min(ratios.rapid));
+        let below = ratios.feed < self.max_feed_ratio;
+        if self.order >= 3 {
             if self.runs_as_planned(ask, below, &ratios) {
                 self.recovering = false;
-                return self.covered(self.config.period_s);
+                return self.covered(self.period_s);
             }
-            self.cursor
-                .fill_horizon(self.config.period_s, &mut self.horizon);
+            self.cursor.fill_horizon(self.period_s, &mut self.horizon);
         } else if ask == Ask::Run && below {
             let longer = self.longer();
             ratios.feed /= longer;
@@ -84,17 +206,17 @@ impl FineLoop {
         } else {
             0.0
         };
-        let delta_s = if self.config.order >= 3 {
+        let delta_s = if self.order >= 3 {
             self.govern_smooth(ask, &ratios, way_speed, end_mm)
         } else {
             self.govern_steep(ask, &ratios, way_speed)
         };
-        let limited = self.max_rate() < 1.0;
+        let limited = self.request.max_rate < 1.0;
         let asked = ask != Ask::Run || below || ratios.rapid < 1.0 || end_mm.is_some() || limited;
         let sigma = self.governor.sigma();
-        self.counters.queue_limited_samples += u64::from(limited && ask == Ask::Run && sigma < 1.0);
+        self.chosen.is_queue_limited = limited && ask == Ask::Run && sigma < 1.0;
         self.recovering = asked || (self.recovering && sigma < 1.0);
-        self.counters.governed_samples += u64::from(sigma < 1.0 && !self.recovering);
+        self.chosen.is_unasked = sigma < 1.0 && !self.recovering;
         self.stop_at_line_end(end_mm);
         self.covered(delta_s)
     }
@@ -102,9 +224,8 @@ impl FineLoop {
     /// How much longer the way of the linear axes is in a period like this one than that of the path coordinate, which is a
     /// polynomial of its own; at least 1.
     fn longer(&mut self) -> f64 {
-        let delta_s = self.governor.sigma() * self.config.period_s;
-        let lanes = (self.config.lane_count(), self.config.linear);
-        let longer = self.cursor.on_plan_ahead(lanes, |place| {
+        let delta_s = self.governor.sigma() * self.period_s;
+        let longer = self.cursor.on_plan_ahead(self.axes, |place| {
             let mut soon = place;
             soon.go(delta_s);
             let (from, to) = (place.pace()?, soon.pace()?);
@@ -120,8 +241,9 @@ impl FineLoop {
     /// Whether program time passes at its own rate and nothing asks for another: then nothing needs to be foreseen.
     fn runs_as_planned(&self, ask: Ask, below: bool, ratios: &Ratios) -> bool {
         let constant = self.governor.sigma() == 1.0 && self.governor.rate_per_s() == 0.0;
-        let unasked = ask == Ask::Run && !below && ratios.rapid >= 1.0 && !self.given.single_block;
-        constant && unasked && self.max_rate() == 1.0 && self.plan_limit() == 1.0
+        let unasked =
+            ask == Ask::Run && !below && ratios.rapid >= 1.0 && !self.request.single_block;
+        constant && unasked && self.request.max_rate == 1.0 && self.plan_limit() == 1.0
     }
 
     /// As much of `delta_s` as lies within what was looked at.
@@ -133,24 +255,19 @@ impl FineLoop {
         }))
     }
 
-    /// The highest rate that the queue allows.
-    pub(super) fn max_rate(&self) -> f64 {
-        self.depth.max_rate.load()
-    }
-
     /// The highest rate at which the plan keeps velocity and acceleration. Jerk beyond the limit at single points need not be
     /// in the samples; where it is, the guard sees it.
     fn plan_limit(&self) -> f64 {
-        // Under `count` everything is sent: forms that break limits on purpose are not slowed.
-        if self.config.guard == GuardMode::Count {
-            return 1.0;
+        if self.sends_all {
+            1.0
+        } else {
+            Governor::plan_limit(&self.points)
         }
-        Governor::plan_limit(&self.points)
     }
 
     /// Limits of velocity and acceleration: σ is linear in the period.
     fn govern_steep(&mut self, ask: Ask, ratios: &Ratios, way_speed_mm_per_s: f64) -> f64 {
-        let limit = self.plan_limit().min(self.max_rate());
+        let limit = self.plan_limit().min(self.request.max_rate);
         self.ask_for_rate(limit);
         if ask == Ask::Run {
             self.look_at_feeds(ratios);
@@ -178,14 +295,11 @@ impl FineLoop {
     /// Notes from which rates ratio × programmed feed can be kept ahead.
     fn look_at_feeds(&mut self, ratios: &Ratios) {
         let Self {
-            cursor,
-            governor,
-            config,
-            ..
+            cursor, governor, ..
         } = self;
         governor.look_no_more();
-        if ratios.feed < config.max_feed_ratio {
-            cursor.on_plan_ahead((config.lane_count(), config.linear), |place| {
+        if ratios.feed < self.max_feed_ratio {
+            cursor.on_plan_ahead(self.axes, |place| {
                 governor.look_ahead(place, ratios.feed);
             });
         }
@@ -217,15 +331,15 @@ impl FineLoop {
         let path = self.cursor.path_derivatives();
         let ahead = self
             .cursor
-            .planned_after(self.governor.sigma() * self.config.period_s);
-        let limit = self.plan_limit().min(self.max_rate());
+            .planned_after(self.governor.sigma() * self.period_s);
+        let limit = self.plan_limit().min(self.request.max_rate);
         self.ask_for_rate(limit);
         let run = if ahead.rapid {
             ratios.rapid.min(limit)
         } else {
             limit
         };
-        let ratio = if ratios.feed < self.config.max_feed_ratio {
+        let ratio = if ratios.feed < self.max_feed_ratio {
             ratios.feed
         } else {
             f64::INFINITY
@@ -260,13 +374,10 @@ impl FineLoop {
         };
         let (governor, horizon) = (&mut self.governor, &self.horizon);
         let recent = self.cursor.recent_steps();
-        let lanes = (self.config.lane_count(), self.config.linear);
-        let chosen = self
-            .cursor
-            .on_plan_ahead(lanes, |place| governor.smooth(&aim, horizon, place, recent));
-        if chosen.relaxed {
-            self.guard.relax_jerk();
-        }
+        let chosen = self.cursor.on_plan_ahead(self.axes, |place| {
+            governor.smooth(&aim, horizon, place, recent)
+        });
+        self.chosen.is_jerk_relaxed = chosen.relaxed;
         chosen.delta_s
     }
 
@@ -275,13 +386,13 @@ impl FineLoop {
     fn begin_below(&mut self, ratios: &Ratios) {
         let mut sigma = self.governor.sigma();
         for _ in 0..REST_ROUNDS {
-            let allowed = self.rate_below(sigma * self.config.period_s, ratios);
+            let allowed = self.rate_below(sigma * self.period_s, ratios);
             if sigma <= allowed {
                 break;
             }
             sigma = allowed.max((sigma * allowed).sqrt() * (1.0 - 1e-9));
         }
-        let allowed = self.rate_below(sigma * self.config.period_s, ratios);
+        let allowed = self.rate_below(sigma * self.period_s, ratios);
         self.governor.jump(sigma.min(allowed));
     }
 
@@ -294,45 +405,11 @@ impl FineLoop {
                 .speed_mm_per_s
                 .max((ahead.path_mm - from_mm) / delta_s);
             from_mm = ahead.path_mm;
-            if !ahead.rapid && ratios.feed < self.config.max_feed_ratio {
+            if !ahead.rapid && ratios.feed < self.max_feed_ratio {
                 rate = rate.min(ratios.feed * ahead.feed_mm_per_s / fastest);
             }
         }
         rate
-    }
-
-    /// The operator's feed override, where the program permits it.
-    pub(super) fn permitted_override(&self) -> f64 {
-        if self.outputs.override_permitted {
-            self.given.feed_override
-        } else {
-            1.0
-        }
-    }
-
-    pub(super) fn ratios_in_force(&self) -> Ratios {
-        let operator = self.permitted_override();
-        let [feed, mean_feed] = if self.outputs.adaptive_permitted {
-            // What is above 1 is in the ratio already, within the strategy's own bounds.
-            let operator = if self.config.strategy_takes_override {
-                operator.min(1.0)
-            } else {
-                operator
-            };
-            [self.ratio.now(), self.ratio.mean()].map(|ratio| operator * ratio)
-        } else {
-            [operator; 2]
-        };
-        let rapid = if self.outputs.override_permitted {
-            self.given.rapid_override.min(1.0)
-        } else {
-            1.0
-        };
-        Ratios {
-            feed,
-            mean_feed,
-            rapid,
-        }
     }
 
     /// The rate at which the path speed is at most ratio × programmed feed at the end of the period, and no more than
@@ -373,7 +450,7 @@ impl FineLoop {
 
     /// Whether neither a feed nor a rapid is to be slower than planned: then the plan itself keeps both at any rate.
     fn asks_for_nothing(&self, ratios: &Ratios) -> bool {
-        ratios.feed >= self.config.max_feed_ratio && ratios.rapid >= 1.0
+        ratios.feed >= self.max_feed_ratio && ratios.rapid >= 1.0
     }
 
     /// The same from rest, where any rate is as good to begin with: one that is kept over the period.
@@ -382,8 +459,7 @@ impl FineLoop {
         // The faster the plan is left, the lower the rate it leaves: their geometric mean is the answer where speed grows
         // with time, and halves what is wrong with it in each round where it grows with the square of time.
         for round in 0..2 * REST_ROUNDS {
-            let asked =
-                self.asked_of_period(sigma * self.config.period_s, ratios, way_speed_mm_per_s);
+            let asked = self.asked_of_period(sigma * self.period_s, ratios, way_speed_mm_per_s);
             let next = asked.at_end.min(asked.mean);
             if next == sigma {
                 break;
@@ -412,8 +488,7 @@ impl FineLoop {
         let (mut kept, mut high) = (0.0, too_high);
         for _ in 0..REST_HALVINGS {
             let sigma = f64::midpoint(kept, high);
-            let asked =
-                self.asked_of_period(sigma * self.config.period_s, ratios, way_speed_mm_per_s);
+            let asked = self.asked_of_period(sigma * self.period_s, ratios, way_speed_mm_per_s);
             if sigma <= asked.at_end.min(asked.mean) {
                 kept = sigma;
             } else {
@@ -427,7 +502,7 @@ impl FineLoop {
     fn asked_of_period(&mut self, delta_s: f64, ratios: &Ratios, way_speed_mm_per_s: f64) -> Asked {
         let from_mm = self.cursor.path_mm();
         let ahead = self.cursor.planned_after(delta_s);
-        let keeps = ratios.feed >= self.config.max_feed_ratio;
+        let keeps = ratios.feed >= self.max_feed_ratio;
         let allowed_mm_per_s = if keeps {
             f64::INFINITY
         } else {
@@ -473,17 +548,17 @@ impl FineLoop {
         if end_mm.is_some() {
             self.ask_for_rate(0.0);
         }
-        if ratios.feed >= self.config.max_feed_ratio {
+        if ratios.feed >= self.max_feed_ratio {
             return at_end;
         }
         let along = self.along();
         let stop_s = along.speed_mm_per_s / along.max_mm_per_s2
             + self.horizon.reach_s
-            + SLOWDOWN_PERIODS * self.config.period_s;
+            + SLOWDOWN_PERIODS * self.period_s;
         let until_s = self.cursor.program_time_s() + stop_s;
         self.slowdowns.extend(&mut self.cursor, until_s);
         let marks = self.slowdowns.marks();
-        let met = |mark: &Slowdown| mark.speed_to_meet_mm_per_s(ratios.feed, self.config.period_s);
+        let met = |mark: &Slowdown| mark.speed_to_meet_mm_per_s(ratios.feed, self.period_s);
         let mut least = (at_end, f64::INFINITY);
         for mark in marks {
             least = (
@@ -503,9 +578,9 @@ impl FineLoop {
     /// With limits of order 2 the speeds at the ends of the periods to come are laid out ([`Along::speed_towards`]). With a
     /// jerk limit it is decided period by period whether braking may still wait.
     pub(super) fn speed_towards(&self, place_mm: f64, end_mm_per_s: f64) -> f64 {
-        let (along, period_s) = (self.along(), self.config.period_s);
+        let (along, period_s) = (self.along(), self.period_s);
         let left_mm = place_mm - self.cursor.path_mm();
-        if self.config.order < 3 {
+        if self.order < 3 {
             return along.speed_towards(left_mm, end_mm_per_s, period_s);
         }
         let soon_mm = BRAKING_PERIODS
@@ -519,6 +594,11 @@ impl FineLoop {
         if waits { f64::INFINITY } else { end_mm_per_s }
     }
 
+    /// A rate of this much is asked for in this period, by ratios, places ahead or the queue.
+    fn ask_for_rate(&mut self, rate: f64) {
+        self.chosen.least_asked = self.chosen.least_asked.min(rate);
+    }
+
     /// The state along the path, with what every queued segment leaves to brake with.
     pub(super) fn along(&self) -> Along {
         let [speed, acceleration, _] = self.cursor.path_derivatives();
@@ -527,7 +607,7 @@ impl FineLoop {
             speed_mm_per_s: sigma * speed,
             acceleration_mm_per_s2: sigma * sigma * acceleration
                 + speed * self.governor.rate_per_s(),
-            max_mm_per_s2: STOP_SHARE * self.depth.stop_deceleration_mm_per_s2.load(),
+            max_mm_per_s2: STOP_SHARE * self.request.stop_deceleration_mm_per_s2,
             jerk_mm_per_s3: BRAKING_JERK_SHARE * self.horizon.path_jerk_mm_per_s3,
         }
     }

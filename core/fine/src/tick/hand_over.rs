@@ -35,7 +35,7 @@ impl FineLoop {
         let (joint, within_s) = self
             .outputs
             .hand_over
-            .filter(|_| self.cursor.is_resting())?;
+            .filter(|_| self.plan.cursor.is_resting())?;
         self.outputs.hand_over = None;
         if joint >= self.joints {
             return None;

@@ -6,8 +6,7 @@
 
 use tandem_sdk::{Segment, SegmentFlags};
 
-use super::FineLoop;
-use super::govern::{FEED_TOLERANCE, Ratios, within};
+use super::govern::{FEED_TOLERANCE, PlanFollower, Ratios, within};
 
 /// How far a period has been laid out.
 #[derive(Clone, Copy, Debug)]
@@ -38,7 +37,7 @@ impl Laid {
     }
 }
 
-impl FineLoop {
+impl PlanFollower {
     /// Lays the period out segment by segment, at no rate above `limit`; takes the rate at its end and gives the program time
     /// that passes, s.
     pub(super) fn govern_in_pieces(
@@ -51,13 +50,12 @@ impl FineLoop {
             cursor,
             points,
             governor,
-            config,
             ..
         } = self;
         let covered_s = points.covered_s;
         let mut laid = Laid {
             sigma: governor.sigma(),
-            left_s: config.period_s,
+            left_s: self.period_s,
             passed_s: 0.0,
         };
         cursor.pieces(|segment, from_s| {

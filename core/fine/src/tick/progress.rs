@@ -57,17 +57,17 @@ impl Progress {
         }
     }
 
+    /// The least rate that was asked for in a period.
+    pub(super) fn ask(&mut self, rate: f64) {
+        self.asked = self.asked.min(rate);
+    }
+
     fn begin(&mut self, now_s: f64) {
         (self.periods, self.from_s, self.asked) = (0, now_s, 1.0);
     }
 }
 
 impl FineLoop {
-    /// A rate of this much is asked for in this period, by ratios and places ahead.
-    pub(super) fn ask_for_rate(&mut self, rate: f64) {
-        self.progress.asked = self.progress.asked.min(rate);
-    }
-
     /// Whether an override or a ratio is as good as 0: what passes then is in the rounding of a day.
     fn stands_by_ratio(&self) -> bool {
         let ratios = self.ratios_in_force();
@@ -75,12 +75,12 @@ impl FineLoop {
     }
 
     fn has_nothing_to_do(&self, reached: Reached) -> bool {
-        reached == Reached::Rest && self.cursor.is_last()
+        reached == Reached::Rest && self.plan.cursor.is_last()
     }
 
     /// After a move: program time has got on, or nothing asks for it, or that is a fault.
     pub(super) fn watch_progress(&mut self, ask: Ask, reached: Reached) {
-        let now_s = self.cursor.program_time_s();
+        let now_s = self.plan.cursor.program_time_s();
         let grown_s = now_s - self.progress.from_s;
         let min_s = self.progress.asked * self.config.period_s;
         // What is true nearly always is looked at first.

@@ -55,14 +55,20 @@ impl FineLoop {
             self.stop = Some(Stop::abort());
         } else if self.is_jog_let_go() {
             self.stop.get_or_insert(Stop::abort());
-        } else if let Some(by) = self.outputs.correction.filter(|_| self.cursor.is_resting()) {
+        } else if let Some(by) = self
+            .outputs
+            .correction
+            .filter(|_| self.plan.cursor.is_resting())
+        {
             self.outputs.correction = None;
             self.correct(&by);
             self.stop = Some(Stop {
                 cause: RestCause::Corrected,
                 latch: None,
             });
-        } else if self.cursor.is_resting() && self.cursor.segment().stop_on.edge != Edge::None {
+        } else if self.plan.cursor.is_resting()
+            && self.plan.cursor.segment().stop_on.edge != Edge::None
+        {
             self.stop.get_or_insert(Stop {
                 cause: RestCause::Missed,
                 latch: None,
@@ -94,10 +100,10 @@ impl FineLoop {
     /// At a rest: tells the drives what the next motion waits for. Whether they are told in this period, so that it begins in the
     /// next one.
     pub(super) fn arm_next(&mut self) -> bool {
-        if !self.cursor.is_resting() {
+        if !self.plan.cursor.is_resting() {
             return false;
         }
-        let arm = arm_for(&self.cursor.next_stop_on());
+        let arm = arm_for(&self.plan.cursor.next_stop_on());
         let is_new = arm != self.arm && arm != Arm::default();
         self.arm = arm;
         is_new
@@ -106,7 +112,7 @@ impl FineLoop {
     /// After a move: a motion that waits for an edge may have begun.
     pub(super) fn begin_edge(&mut self) {
         if self.edge.begin(
-            self.cursor.segment(),
+            self.plan.cursor.segment(),
             &self.feedback,
             &self.config.home_switches,
         ) {
@@ -119,7 +125,7 @@ impl FineLoop {
 
     /// After an exchange: the edge may have come.
     pub(super) fn watch_edge(&mut self) {
-        let stop_on = &self.cursor.segment().stop_on;
+        let stop_on = &self.plan.cursor.segment().stop_on;
         if stop_on.edge == Edge::None
             || self.stop.is_some()
             || !matches!(self.phase, Phase::Following)
@@ -144,25 +150,24 @@ impl FineLoop {
     pub(super) fn end_epoch(&mut self, stop: Stop) -> Input {
         let latch = stop.latch.map(|joints| self.axes_of(&joints));
         let rest = Rest {
-            epoch: self.cursor.epoch(),
+            epoch: self.plan.cursor.epoch(),
             cause: stop.cause,
             tick: self.tick,
-            block: self.cursor.segment().block,
-            line: self.cursor.segment().line,
-            stop_on: self.cursor.segment().stop_on,
+            block: self.plan.cursor.segment().block,
+            line: self.plan.cursor.segment().line,
+            stop_on: self.plan.cursor.segment().stop_on,
             position: self.config.axes_alone(self.guard.position()),
             latch,
-            program_time_s: self.cursor.program_time_s(),
-            path_mm: self.cursor.path_mm(),
+            program_time_s: self.plan.cursor.program_time_s(),
+            path_mm: self.plan.cursor.path_mm(),
         };
         if self.rests.push(rest).is_err() {
             return Input::Hold;
         }
-        self.cursor.end_epoch(self.guard.position());
+        self.plan.cursor.end_epoch(self.guard.position());
         self.edge.end();
         self.arm = Arm::default();
-        self.slowdowns.clear();
-        self.line_end.forget();
+        self.plan.forget_ahead();
         self.queue.forget();
         (self.stop, self.phase) = (None, Phase::AwaitingReplan);
         // A jog that is let go leaves a hold as it is: the next one waits for its end too. An abort that comes while the joints
@@ -189,9 +194,9 @@ impl FineLoop {
         if self.given.abort {
             return self.end_epoch(Stop::abort());
         }
-        let enough = self.depth.is_of(self.cursor.epoch())
-            && self.depth.may_start(self.cursor.program_time_s());
-        if self.cursor.drop_older() && enough && self.state == MachineState::Standstill {
+        let enough = self.depth.is_of(self.plan.cursor.epoch())
+            && self.depth.may_start(self.plan.cursor.program_time_s());
+        if self.plan.cursor.drop_older() && enough && self.state == MachineState::Standstill {
             self.phase = Phase::Following;
         }
         Input::Rest

@@ -97,7 +97,7 @@ impl FineLoop {
 
     /// The input that the motion waits for, as a mask.
     fn awaited(&self) -> u64 {
-        let stop_on = &self.cursor.segment().stop_on;
+        let stop_on = &self.plan.cursor.segment().stop_on;
         if stop_on.edge == Edge::None {
             0
         } else {

@@ -3,6 +3,7 @@
 use std::sync::atomic::Ordering::Relaxed;
 
 use super::FineLoop;
+use super::govern::PlanFollower;
 use crate::governor::RestAt;
 use crate::governor::tuning::LINE_END_JERK_SHARES;
 use crate::law::Along;
@@ -15,10 +16,10 @@ const AT_LINE_END_MM: f64 = 0.001;
 /// Fine periods at the present speed by which the end of a line is looked for further than a stop takes.
 const LINE_END_LOOK_PERIODS: f64 = 3.0;
 
-impl FineLoop {
+impl PlanFollower {
     /// In single-block operation: where to come to rest, as a path coordinate, mm.
     pub(super) fn line_end(&mut self) -> Option<f64> {
-        if !self.given.single_block {
+        if !self.request.single_block {
             self.line_end.forget();
             return None;
         }
@@ -27,12 +28,12 @@ impl FineLoop {
         }
         if self.line_end.is_passed(&self.cursor) {
             // The next corner may need jerk that braking counted on; the machine then stops slightly past the end of the line.
-            self.controls.hold.store(true, Relaxed);
+            self.chosen.holds = true;
             self.line_end.forget();
             return None;
         }
         let along = self.along();
-        let way_mm = if self.config.order >= 3 {
+        let way_mm = if self.order >= 3 {
             let rest = self.rest_at(f64::INFINITY);
             let stop = Along {
                 jerk_mm_per_s3: rest.jerk_mm_per_s3,
@@ -42,14 +43,14 @@ impl FineLoop {
         } else {
             along.speed_mm_per_s * along.speed_mm_per_s / (2.0 * along.max_mm_per_s2)
         };
-        let soon_mm = LINE_END_LOOK_PERIODS * self.config.period_s * along.speed_mm_per_s;
+        let soon_mm = LINE_END_LOOK_PERIODS * self.period_s * along.speed_mm_per_s;
         self.line_end.look(&mut self.cursor, way_mm + soon_mm)
     }
 
     /// The speed at the end of this period from which rest can be met at the end of the line, mm/s; with a jerk limit σ̈ is sought
     /// for it instead, until the end is next to reached.
     pub(super) fn speed_to_rest(&self, end_mm: f64) -> f64 {
-        if self.config.order < 3 {
+        if self.order < 3 {
             return self.speed_towards(end_mm, 0.0);
         }
         if end_mm - self.cursor.path_mm() > AT_LINE_END_MM {
@@ -73,19 +74,27 @@ impl FineLoop {
     pub(super) fn stop_at_line_end(&mut self, end_mm: Option<f64>) {
         let Some(end_mm) = end_mm else { return };
         if self.governor.sigma() == 0.0 && end_mm - self.cursor.path_mm() < LINE_END_MM {
-            self.controls.hold.store(true, Relaxed);
+            self.chosen.holds = true;
             self.line_end.forget();
         }
     }
+}
 
+impl FineLoop {
     /// At a rest of the plan between two lines: a feed hold stands until the operator resumes.
     pub(super) fn stop_between_lines(&mut self) {
-        if !self.given.single_block || !self.cursor.is_resting() {
-            self.line_moves |= !self.cursor.is_resting();
+        if !self.given.single_block || !self.plan.cursor.is_resting() {
+            self.line_moves |= !self.plan.cursor.is_resting();
             return;
         }
-        let line = self.cursor.segment().line;
-        if self.line_moves && self.cursor.next_line().is_some_and(|next| next != line) {
+        let line = self.plan.cursor.segment().line;
+        if self.line_moves
+            && self
+                .plan
+                .cursor
+                .next_line()
+                .is_some_and(|next| next != line)
+        {
             self.controls.hold.store(true, Relaxed);
             // It acts in this period already.
             self.given.hold = true;

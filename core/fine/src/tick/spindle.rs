@@ -61,8 +61,9 @@ impl FineLoop {
         if !self.spin_up.is_awaited() {
             return false;
         }
-        let stands_inside = !self.cursor.is_resting() && self.governor.sigma() == 0.0;
-        self.spin_up.waits = (self.has_answered() || stands_inside) && self.cursor.is_cutting();
+        let stands_inside = !self.plan.cursor.is_resting() && self.plan.governor.sigma() == 0.0;
+        self.spin_up.waits =
+            (self.has_answered() || stands_inside) && self.plan.cursor.is_cutting();
         self.spin_up.waits
     }
 
