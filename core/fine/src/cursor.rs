@@ -1,14 +1,10 @@
 //! Where the fine loop is in the queue of segments.
 
-mod look;
-
-pub use look::is_cut;
-
 use rtrb::Consumer;
 use tandem_rings::Queued;
-use tandem_sdk::{AxisVector, Segment, SegmentFlags};
+use tandem_sdk::{AxisVector, Edge, Segment, SegmentFlags, StopOn};
 
-use crate::period_points::PeriodPoints;
+use crate::plan_ahead::{Ahead, derivatives, ends};
 use crate::steps::{Recent, Steps};
 
 /// What a move lacks to the end of a segment, as a share of its time, that is rounding: the move reaches the end, and owes it. A
@@ -161,80 +157,47 @@ impl Cursor {
         self.recent
     }
 
-    /// Collects where the plan goes within `horizon_s` from here, without moving.
-    pub fn scan(&mut self, horizon_s: f64, points: &mut PeriodPoints) {
-        points.clear();
-        let mut left_s = horizon_s;
-        if !self.resting {
-            let here_s = self.segment.duration_s - self.local_s;
-            points.add(&self.segment, self.local_s, here_s.min(left_s));
-            left_s -= here_s;
-            if ends(&self.segment) {
-                return;
-            }
-        }
-        let waiting = self.entries.slots().min(PeriodPoints::SEGMENTS);
-        let Ok(chunk) = self.entries.read_chunk(waiting) else {
-            return;
-        };
-        let (first, second) = chunk.as_slices();
-        for queued in first.iter().chain(second) {
-            if left_s <= 0.0 || points.is_full() {
-                break;
-            }
-            let Queued::Segment { segment, .. } = queued else {
-                continue;
-            };
-            points.add(segment, 0.0, segment.duration_s.min(left_s));
-            left_s -= segment.duration_s;
-            if ends(segment) {
-                // At a wall behind which only a rest without duration has come, no time leads there: but it is to be reached.
-                points.covered_s = points.covered_s.max(f64::MIN_POSITIVE);
-                return;
-            }
-        }
-        if left_s <= 0.0 {
-            // The sum of the pieces may be a rounding short of it.
-            points.covered_s = horizon_s;
+    /// First to third derivative of the path coordinate here by program time, mm/s and so on.
+    pub fn path_derivatives(&self) -> [f64; 3] {
+        if self.resting {
+            [0.0; 3]
+        } else {
+            derivatives(&self.segment.path, self.local_s)
         }
     }
 
-    /// Path speed planned `ahead_s` from here, without moving, with the programmed feed and whether it is a rapid.
-    pub fn planned_after(&mut self, ahead_s: f64) -> PlannedSpeed {
-        let mut left_s = ahead_s;
+    /// What is queued from here on, for as long as nothing moves.
+    pub fn ahead(&mut self) -> Ahead<'_> {
+        let local_s = (!self.resting).then_some(self.local_s);
+        let slots = self.entries.slots();
+        let queued = self.entries.read_chunk(slots).ok();
+        Ahead::new(&self.segment, local_s, self.taken, queued)
+    }
+
+    /// Number, counted from the start, of the entry that comes next.
+    pub fn next_number(&self) -> u64 {
+        self.taken
+    }
+
+    /// Line of the next segment queued.
+    pub fn next_line(&mut self) -> Option<u32> {
+        self.ahead().next_segment(0).map(|segment| segment.line)
+    }
+
+    /// What the motion that begins next at a rest waits for.
+    pub fn next_stop_on(&mut self) -> StopOn {
+        let epoch = self.epoch;
+        let ahead = self.ahead();
+        let next = ahead.next_segment(epoch);
+        next.map_or_else(StopOn::default, |segment| segment.stop_on)
+    }
+
+    /// Whether what comes next, with nothing to switch before it, is a cut; elsewhere than at a rest, whether here is one.
+    pub fn is_cutting(&mut self) -> bool {
         if !self.resting {
-            let here_s = self.segment.duration_s - self.local_s;
-            if left_s < here_s || ends(&self.segment) {
-                return PlannedSpeed::at(&self.segment, self.local_s + left_s.min(here_s));
-            }
-            left_s -= here_s;
+            return is_cut(&self.segment);
         }
-        let waiting = self.entries.slots().min(PeriodPoints::SEGMENTS);
-        let mut last = PlannedSpeed::at(&self.segment, self.segment.duration_s);
-        let mut most = if self.resting {
-            0.0
-        } else {
-            self.segment.feed_mm_per_s
-        };
-        let Ok(chunk) = self.entries.read_chunk(waiting) else {
-            return last;
-        };
-        let (first, second) = chunk.as_slices();
-        for queued in first.iter().chain(second) {
-            let Queued::Segment { segment, .. } = queued else {
-                continue;
-            };
-            most = segment.feed_mm_per_s.max(most);
-            last = PlannedSpeed {
-                max_feed_mm_per_s: most,
-                ..PlannedSpeed::at(segment, left_s.min(segment.duration_s))
-            };
-            if left_s < segment.duration_s || ends(segment) {
-                return last;
-            }
-            left_s -= segment.duration_s;
-        }
-        last
+        matches!(self.entries.peek(), Ok(Queued::Segment { segment, .. }) if segment.epoch >= self.epoch && is_cut(segment))
     }
 
     /// Moves on by `delta_s` of program time. Events on the way, and the segments that begin at a rest, are given to `meet`,
@@ -333,40 +296,18 @@ impl Cursor {
     }
 }
 
-fn ends(segment: &Segment) -> bool {
-    segment.flags.contains(SegmentFlags::ENDS_AT_REST)
-}
-
-/// The plan a little ahead.
-#[derive(Clone, Copy, Debug)]
-pub struct PlannedSpeed {
-    /// Planned path speed, mm/s.
-    pub speed_mm_per_s: f64,
-    /// Path coordinate, mm.
-    pub path_mm: f64,
-    /// Programmed feed, mm/s.
-    pub feed_mm_per_s: f64,
-    /// Highest programmed feed on the way there, mm/s.
-    pub max_feed_mm_per_s: f64,
-    /// Rapid motion.
-    pub rapid: bool,
-}
-
-impl PlannedSpeed {
-    fn at(segment: &Segment, local_s: f64) -> Self {
-        Self {
-            speed_mm_per_s: segment.path_speed_mm_per_s(local_s),
-            path_mm: segment.path_mm(local_s),
-            feed_mm_per_s: segment.feed_mm_per_s,
-            max_feed_mm_per_s: segment.feed_mm_per_s,
-            rapid: segment.flags.contains(SegmentFlags::RAPID),
-        }
-    }
+/// Whether the tool may cut in it: a motion at a feed that waits for no input.
+pub fn is_cut(segment: &Segment) -> bool {
+    let moves = segment.path[1..]
+        .iter()
+        .any(|coefficient| *coefficient != 0.0);
+    moves && !segment.flags.contains(SegmentFlags::RAPID) && segment.stop_on.edge == Edge::None
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::period_points::PeriodPoints;
     use rtrb::RingBuffer;
     use tandem_sdk::{AxisLimits, MAX_AXES};
 
@@ -402,7 +343,7 @@ mod tests {
         };
         let mut points = PeriodPoints::new(&[axis; MAX_AXES], 1);
         (1..=most).find(|_| {
-            cursor.scan(rate * period_s, &mut points);
+            points.fill(&cursor.ahead(), rate * period_s);
             let covered_s = if cursor.is_resting() {
                 f64::MAX
             } else {

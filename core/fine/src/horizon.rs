@@ -6,18 +6,15 @@ use crate::governor::tuning::{
 use tandem_sdk::{AxisLimits, MAX_AXES, Segment};
 
 use crate::law::stop_s;
+use crate::plan_ahead::{Ahead, Motion, derivatives};
 
-/// One point of the plan: derivatives by program time, per axis.
+/// One point of the plan.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct HorizonPoint {
     /// Program time from here, s.
     pub offset_s: f64,
-    /// Velocity, mm/s.
-    pub velocity: [f64; MAX_AXES],
-    /// Acceleration, mm/s².
-    pub acceleration: [f64; MAX_AXES],
-    /// Jerk, mm/s³.
-    pub jerk: [f64; MAX_AXES],
+    /// How the plan moves there.
+    pub motion: Motion,
     /// Path jerk that the limits leave here on a straight path, mm/s³; infinite where the path stands still.
     pub path_jerk_mm_per_s3: f64,
 }
@@ -66,8 +63,30 @@ impl Horizon {
         }
     }
 
+    /// Collects the points of the coming period, and a grid beyond it.
+    pub fn fill(&mut self, ahead: &Ahead<'_>, period_s: f64) {
+        self.clear();
+        let step_s = self.reach_s / Self::GRID as f64;
+        let mut grid_s = period_s + step_s;
+        for piece in ahead.pieces() {
+            let (segment, duration_s) = (piece.segment, piece.duration_s());
+            let is_in_period = piece.offset_s < period_s;
+            if (is_in_period && self.is_full()) || !(is_in_period || grid_s <= self.reach_s) {
+                return;
+            }
+            if is_in_period {
+                let stretch_s = duration_s.min(period_s - piece.offset_s);
+                self.stretch(segment, piece.from_s, stretch_s, piece.offset_s);
+            }
+            while grid_s <= piece.offset_s + duration_s && grid_s <= self.reach_s {
+                self.point(segment, piece.from_s + (grid_s - piece.offset_s), grid_s);
+                grid_s += step_s;
+            }
+        }
+    }
+
     /// Forgets all points.
-    pub fn clear(&mut self) {
+    fn clear(&mut self) {
         self.count = 0;
         (self.path_jerk_mm_per_s3, self.rate_change_per_s2) =
             (f64::INFINITY, self.max_change_per_s2);
@@ -75,7 +94,7 @@ impl Horizon {
     }
 
     /// Whether the points of a period have taken what room there is beside the grid.
-    pub fn is_full(&self) -> bool {
+    fn is_full(&self) -> bool {
         self.count + Self::GRID + 2 > Self::POINTS
     }
 
@@ -90,7 +109,7 @@ impl Horizon {
     }
 
     /// Adds both ends of a stretch of `segment` in the coming period.
-    pub fn stretch(&mut self, segment: &Segment, from_s: f64, duration_s: f64, offset_s: f64) {
+    fn stretch(&mut self, segment: &Segment, from_s: f64, duration_s: f64, offset_s: f64) {
         for (t, offset) in [
             (from_s, offset_s),
             (from_s + duration_s, offset_s + duration_s),
@@ -100,20 +119,17 @@ impl Horizon {
     }
 
     /// Adds the point at local time `t_s` of `segment`, `offset_s` of program time from here.
-    pub fn point(&mut self, segment: &Segment, t_s: f64, offset_s: f64) {
+    fn point(&mut self, segment: &Segment, t_s: f64, offset_s: f64) {
         let point = &mut self.list[self.count];
         point.offset_s = offset_s;
         let mut per_speed = f64::INFINITY;
+        point.motion.look_at(segment, t_s, self.axes);
+        let motion = &point.motion;
         for axis in 0..self.axes {
-            let [velocity, acceleration, jerk] = derivatives(&segment.coefficients[axis], t_s);
-            (
-                point.velocity[axis],
-                point.acceleration[axis],
-                point.jerk[axis],
-            ) = (velocity, acceleration, jerk);
-            per_speed = per_speed.min(self.jerk[axis] / velocity.abs());
-            let steady = acceleration.abs() < STRAIGHT_ON_SHARE * self.acceleration[axis]
-                && jerk.abs() < STRAIGHT_ON_SHARE * self.jerk[axis];
+            per_speed = per_speed.min(self.jerk[axis] / motion.velocity[axis].abs());
+            let steady = motion.acceleration[axis].abs()
+                < STRAIGHT_ON_SHARE * self.acceleration[axis]
+                && motion.jerk[axis].abs() < STRAIGHT_ON_SHARE * self.jerk[axis];
             if !steady {
                 self.approach_jerk_share = APPROACH_JERK_SHARE;
             }
@@ -151,13 +167,4 @@ impl Horizon {
     pub fn limits(&self) -> impl Iterator<Item = (usize, (f64, f64))> {
         (0..self.axes).map(|axis| (axis, (self.acceleration[axis], self.jerk[axis])))
     }
-}
-
-/// First, second and third derivative at `t` of the polynomial `c`.
-pub fn derivatives(c: &[f64; 6], t: f64) -> [f64; 3] {
-    [
-        c[1] + t * (2.0 * c[2] + t * (3.0 * c[3] + t * (4.0 * c[4] + t * 5.0 * c[5]))),
-        2.0 * c[2] + t * (6.0 * c[3] + t * (12.0 * c[4] + t * 20.0 * c[5])),
-        6.0 * c[3] + t * (24.0 * c[4] + t * 60.0 * c[5]),
-    ]
 }

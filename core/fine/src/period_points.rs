@@ -1,7 +1,8 @@
 //! Where the plan goes within one fine period: velocity and acceleration at the points that matter.
 
-use tandem_rings::MAX_ENTRIES;
 use tandem_sdk::{AxisLimits, MAX_AXES, Segment, SegmentFlags};
+
+use crate::plan_ahead::{Ahead, LOOK_ENTRIES};
 
 /// One point of the plan, per axis and per s of program time.
 #[derive(Clone, Copy, Debug, Default)]
@@ -30,9 +31,7 @@ pub struct PeriodPoints {
 }
 
 impl PeriodPoints {
-    /// Most segments looked at in one period: those that pass in it, and the ones at its ends.
-    pub const SEGMENTS: usize = MAX_ENTRIES + 4;
-    const POINTS: usize = 3 * Self::SEGMENTS;
+    const POINTS: usize = 3 * LOOK_ENTRIES;
 
     /// No points; the limits are those of the machine's `axes` first axes.
     pub fn new(limits: &[AxisLimits; MAX_AXES], axes: usize) -> Self {
@@ -58,8 +57,31 @@ impl PeriodPoints {
         (self.speed_ratio, self.acceleration_ratio, self.covered_s) = (0.0, 0.0, 0.0);
     }
 
+    /// Collects where the plan goes within `horizon_s` of program time.
+    pub fn fill(&mut self, ahead: &Ahead<'_>, horizon_s: f64) {
+        self.clear();
+        let mut left_s = horizon_s;
+        for piece in ahead.pieces() {
+            if self.count > 0 && (left_s <= 0.0 || self.is_full()) {
+                break;
+            }
+            let duration_s = piece.duration_s();
+            self.add(piece.segment, piece.from_s, duration_s.min(left_s));
+            left_s -= duration_s;
+            if piece.ends_at_rest() {
+                // At a wall behind which only a rest without duration has come, no time leads there: but it is to be reached.
+                self.covered_s = self.covered_s.max(f64::MIN_POSITIVE);
+                return;
+            }
+        }
+        if left_s <= 0.0 {
+            // The sum of the pieces may be a rounding short of it.
+            self.covered_s = horizon_s;
+        }
+    }
+
     /// Whether another segment might not fit.
-    pub fn is_full(&self) -> bool {
+    fn is_full(&self) -> bool {
         self.count + 3 > Self::POINTS
     }
 

@@ -1,10 +1,166 @@
-//! The plan ahead as it is queued, at any place: changes of σ are tried on it before they are begun.
+//! The plan ahead as it is queued, without moving on it: the pieces of it from here on, one after the other ([`Ahead::pieces`]),
+//! or a place that moves to and fro on it ([`PlanCursor`]), on which changes of σ are tried before they are begun.
 
-use tandem_rings::Queued;
+use rtrb::chunks::ReadChunk;
+use tandem_rings::{MAX_ENTRIES, Queued};
 use tandem_sdk::{MAX_AXES, Segment, SegmentFlags};
 
-use crate::horizon::derivatives;
 use crate::steps::Steps;
+
+/// Most entries that one look from piece to piece passes: those that are driven in a period, and the ones at its ends.
+pub const LOOK_ENTRIES: usize = MAX_ENTRIES + 4;
+/// Most entries that a place on the plan ahead reaches over.
+const PLACE_ENTRIES: usize = 512;
+
+/// What is queued, from where the machine is in the plan.
+#[derive(Debug)]
+pub struct Ahead<'a> {
+    segment: &'a Segment,
+    /// Time in that segment, s; none where it rests at its end.
+    local_s: Option<f64>,
+    /// Number of the first entry, counted from the start.
+    first: u64,
+    queued: Option<ReadChunk<'a, Queued>>,
+}
+
+/// A piece of the plan ahead: what is left of a segment.
+#[derive(Clone, Copy, Debug)]
+pub struct Piece<'a> {
+    /// The segment.
+    pub segment: &'a Segment,
+    /// Where the piece begins in it, s; it ends where the segment does.
+    pub from_s: f64,
+    /// Program time from the machine to there, s.
+    pub offset_s: f64,
+}
+
+impl Piece<'_> {
+    /// Its duration, s.
+    pub fn duration_s(&self) -> f64 {
+        self.segment.duration_s - self.from_s
+    }
+
+    /// Whether the plan rests at its end.
+    pub fn ends_at_rest(&self) -> bool {
+        ends(self.segment)
+    }
+}
+
+impl<'a> Ahead<'a> {
+    /// The machine is in `segment`, at `local_s` or at rest at its end; `queued` follows, beginning with entry `first`.
+    pub fn new(
+        segment: &'a Segment,
+        local_s: Option<f64>,
+        first: u64,
+        queued: Option<ReadChunk<'a, Queued>>,
+    ) -> Self {
+        Self {
+            segment,
+            local_s,
+            first,
+            queued,
+        }
+    }
+
+    /// The pieces of the plan from here on, up to the one that ends at rest: as many as a period looks at.
+    pub fn pieces(&self) -> impl Iterator<Item = Piece<'_>> {
+        let here = self.local_s.map(|local_s| (self.segment, local_s));
+        let entries = self.entries_from(self.first).take(LOOK_ENTRIES);
+        let segments = entries.filter_map(|queued| match queued {
+            Queued::Segment { segment, .. } => Some((segment, 0.0)),
+            Queued::Event(_) => None,
+        });
+        let (mut offset_s, mut over) = (0.0, false);
+        here.into_iter()
+            .chain(segments)
+            .map_while(move |(segment, from_s)| {
+                let piece = Piece {
+                    segment,
+                    from_s,
+                    offset_s,
+                };
+                offset_s += piece.duration_s();
+                (!std::mem::replace(&mut over, piece.ends_at_rest())).then_some(piece)
+            })
+    }
+
+    /// The queued entries from `number` on, counted from the start; events are among them.
+    pub fn entries_from(&self, number: u64) -> impl Iterator<Item = &Queued> {
+        let (first, second) = self.slices();
+        let passed = number.saturating_sub(self.first) as usize;
+        first.iter().chain(second).skip(passed)
+    }
+
+    fn slices(&self) -> (&[Queued], &[Queued]) {
+        self.queued
+            .as_ref()
+            .map_or((&[], &[]), ReadChunk::as_slices)
+    }
+
+    /// The next segment queued of `epoch` or a later one.
+    pub fn next_segment(&self, epoch: u32) -> Option<&Segment> {
+        let mut entries = self.entries_from(self.first).take(LOOK_ENTRIES);
+        entries.find_map(|queued| match queued {
+            Queued::Segment { segment, .. } if segment.epoch >= epoch => Some(segment),
+            _ => None,
+        })
+    }
+
+    /// A place on the plan, where the machine is. `axes` axes are looked at, those of the mask `linear` are linear ones.
+    pub fn place(&self, axes: (usize, u32)) -> PlanCursor<'_> {
+        let (first, second) = self.slices();
+        let in_first = first.len().min(PLACE_ENTRIES);
+        let in_second = second.len().min(PLACE_ENTRIES - in_first);
+        let queued = [&first[..in_first], &second[..in_second]];
+        PlanAhead::new(self.segment, queued, axes)
+            .begin(self.local_s.unwrap_or(self.segment.duration_s))
+    }
+
+    /// Path speed planned `ahead_s` from here, with the programmed feed and whether it is a rapid.
+    pub fn planned_after(&self, ahead_s: f64) -> PlannedSpeed {
+        let mut planned = PlannedSpeed::at(self.segment, self.segment.duration_s);
+        let (mut left_s, mut max_feed_mm_per_s) = (ahead_s, 0.0);
+        for piece in self.pieces() {
+            max_feed_mm_per_s = piece.segment.feed_mm_per_s.max(max_feed_mm_per_s);
+            planned = PlannedSpeed {
+                max_feed_mm_per_s,
+                ..PlannedSpeed::at(piece.segment, piece.from_s + left_s.min(piece.duration_s()))
+            };
+            if left_s < piece.duration_s() {
+                break;
+            }
+            left_s -= piece.duration_s();
+        }
+        planned
+    }
+}
+
+/// The plan a little ahead.
+#[derive(Clone, Copy, Debug)]
+pub struct PlannedSpeed {
+    /// Planned path speed, mm/s.
+    pub speed_mm_per_s: f64,
+    /// Path coordinate, mm.
+    pub path_mm: f64,
+    /// Programmed feed, mm/s.
+    pub feed_mm_per_s: f64,
+    /// Highest programmed feed on the way there, mm/s.
+    pub max_feed_mm_per_s: f64,
+    /// Rapid motion.
+    pub rapid: bool,
+}
+
+impl PlannedSpeed {
+    fn at(segment: &Segment, local_s: f64) -> Self {
+        Self {
+            speed_mm_per_s: segment.path_speed_mm_per_s(local_s),
+            path_mm: segment.path_mm(local_s),
+            feed_mm_per_s: segment.feed_mm_per_s,
+            max_feed_mm_per_s: segment.feed_mm_per_s,
+            rapid: segment.flags.contains(SegmentFlags::RAPID),
+        }
+    }
+}
 
 /// The plan from here on: the segment that moves, and what is queued behind it.
 #[derive(Clone, Copy, Debug)]
@@ -56,7 +212,7 @@ pub struct Motion {
 
 impl Motion {
     /// That of `segment` at local time `local_s`, for its first `axes` axes; others stay as they are.
-    fn look_at(&mut self, segment: &Segment, local_s: f64, axes: usize) {
+    pub fn look_at(&mut self, segment: &Segment, local_s: f64, axes: usize) {
         for axis in 0..axes {
             let [velocity, acceleration, jerk] = derivatives(&segment.coefficients[axis], local_s);
             (
@@ -253,6 +409,16 @@ impl<'a> PlanCursor<'a> {
     }
 }
 
-fn ends(segment: &Segment) -> bool {
+/// Whether the plan rests at the end of `segment`.
+pub fn ends(segment: &Segment) -> bool {
     segment.flags.contains(SegmentFlags::ENDS_AT_REST)
+}
+
+/// First, second and third derivative at `t` of the polynomial `c`.
+pub fn derivatives(c: &[f64; 6], t: f64) -> [f64; 3] {
+    [
+        c[1] + t * (2.0 * c[2] + t * (3.0 * c[3] + t * (4.0 * c[4] + t * 5.0 * c[5]))),
+        2.0 * c[2] + t * (6.0 * c[3] + t * (12.0 * c[4] + t * 20.0 * c[5])),
+        6.0 * c[3] + t * (24.0 * c[4] + t * 60.0 * c[5]),
+    ]
 }

@@ -7,6 +7,7 @@ use tandem_rings::{MAX_ENTRIES, Queued};
 use tandem_sdk::{Segment, SegmentFlags};
 
 use crate::cursor::Cursor;
+use crate::plan_ahead::ends;
 
 /// A place on the path from which on the programmed feed is lower.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -79,15 +80,15 @@ impl Slowdowns {
             self.first = (self.first + 1) % MARKS;
             self.count -= 1;
         }
-        self.next = cursor.walk(self.next, ENTRIES, |queued| {
+        for queued in cursor.ahead().entries_from(self.next).take(ENTRIES) {
             if let Queued::Segment { start_s, segment } = queued {
                 if *start_s > until_s {
-                    return false;
+                    break;
                 }
                 self.see(segment);
             }
-            true
-        });
+            self.next += 1;
+        }
     }
 
     /// Forgets the marks: what is queued counts no more.
@@ -167,19 +168,19 @@ impl LineEnd {
                 (self.next, self.line) = (cursor.next_number(), cursor.segment().line);
             }
             let nearest_mm = here_mm + way_mm;
-            let (line, rests, chosen) = (&mut self.line, &mut self.rests, &mut self.chosen_mm);
-            self.next = cursor.walk(self.next, ENTRIES, |queued| {
-                let Queued::Segment { segment, .. } = queued else {
-                    return true;
-                };
-                let ended = segment.line != *line && !*rests && segment.path[0] >= nearest_mm;
-                (*line, *rests) = (
-                    segment.line,
-                    segment.flags.contains(SegmentFlags::ENDS_AT_REST),
-                );
-                *chosen = ended.then_some(segment.path[0]);
-                !ended
-            });
+            for queued in cursor.ahead().entries_from(self.next).take(ENTRIES) {
+                if let Queued::Segment { segment, .. } = queued {
+                    let ended =
+                        segment.line != self.line && !self.rests && segment.path[0] >= nearest_mm;
+                    self.line = segment.line;
+                    self.rests = ends(segment);
+                    if ended {
+                        self.chosen_mm = Some(segment.path[0]);
+                        break;
+                    }
+                }
+                self.next += 1;
+            }
         }
         self.chosen_mm
     }

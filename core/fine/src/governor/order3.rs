@@ -298,10 +298,11 @@ impl Governor {
             period_s: h,
         };
         for point in horizon.iter().take_while(|p| p.offset_s <= h) {
+            let motion = &point.motion;
             for (axis, (limit, _)) in horizon.limits() {
                 let reserved = reserve.acceleration_mm_per_s2(axis, end.sigma, h);
-                let motion = [point.velocity[axis], point.acceleration[axis]];
-                interval.keep_acceleration(motion, &end, ORDER3_LIMIT_SHARE * limit - reserved);
+                let planned = [motion.velocity[axis], motion.acceleration[axis]];
+                interval.keep_acceleration(planned, &end, ORDER3_LIMIT_SHARE * limit - reserved);
             }
         }
     }
@@ -317,14 +318,15 @@ impl Governor {
                 part,
                 period_s: h,
             };
+            let motion = &point.motion;
             for (axis, (_, limit)) in horizon.limits() {
                 let left = ORDER3_LIMIT_SHARE * limit - reserve.jerk_mm_per_s3(axis, at.sigma, h);
-                let motion = [
-                    point.velocity[axis],
-                    point.acceleration[axis],
-                    point.jerk[axis],
+                let planned = [
+                    motion.velocity[axis],
+                    motion.acceleration[axis],
+                    motion.jerk[axis],
                 ];
-                interval.keep_jerk(motion, &at, (left, limit), excess * limit);
+                interval.keep_jerk(planned, &at, (left, limit), excess * limit);
             }
         }
     }

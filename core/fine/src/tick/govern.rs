@@ -182,7 +182,7 @@ impl PlanFollower {
         } else {
             self.governor.sigma()
         };
-        self.cursor.scan(most * self.period_s, &mut self.points);
+        self.points.fill(&self.cursor.ahead(), most * self.period_s);
         self.ask_for_rate((ratios.feed / self.max_feed_ratio).min(ratios.rapid));
         let below = ratios.feed < self.max_feed_ratio;
         if self.order >= 3 {
@@ -190,7 +190,7 @@ impl PlanFollower {
                 self.recovering = false;
                 return self.covered(self.period_s);
             }
-            self.cursor.fill_horizon(self.period_s, &mut self.horizon);
+            self.horizon.fill(&self.cursor.ahead(), self.period_s);
         } else if ask == Ask::Run && below {
             let longer = self.longer();
             ratios.feed /= longer;
@@ -225,15 +225,17 @@ impl PlanFollower {
     /// polynomial of its own; at least 1.
     fn longer(&mut self) -> f64 {
         let delta_s = self.governor.sigma() * self.period_s;
-        let longer = self.cursor.on_plan_ahead(self.axes, |place| {
-            let mut soon = place;
-            soon.go(delta_s);
-            let (from, to) = (place.pace()?, soon.pace()?);
-            let way_mm = to.path_mm - from.path_mm;
-            // Of next to nothing the rounding is a large share.
-            (way_mm > MIN_SHARE * from.path_mm).then(|| from.way_to_mm(&to) / way_mm)
-        });
-        longer
+        let ahead = self.cursor.ahead();
+        let place = ahead.place(self.axes);
+        let mut soon = place;
+        soon.go(delta_s);
+        let (Some(from), Some(to)) = (place.pace(), soon.pace()) else {
+            return 1.0;
+        };
+        let way_mm = to.path_mm - from.path_mm;
+        // Of next to nothing the rounding is a large share.
+        (way_mm > MIN_SHARE * from.path_mm)
+            .then(|| from.way_to_mm(&to) / way_mm)
             .filter(|longer| *longer < MAX_LONGER)
             .map_or(1.0, |longer| 1.0 + (1.0 + LONGER_MARGIN) * (longer - 1.0))
     }
@@ -294,14 +296,11 @@ impl PlanFollower {
 
     /// Notes from which rates ratio × programmed feed can be kept ahead.
     fn look_at_feeds(&mut self, ratios: &Ratios) {
-        let Self {
-            cursor, governor, ..
-        } = self;
-        governor.look_no_more();
+        self.governor.look_no_more();
         if ratios.feed < self.max_feed_ratio {
-            cursor.on_plan_ahead(self.axes, |place| {
-                governor.look_ahead(place, ratios.feed);
-            });
+            let ahead = self.cursor.ahead();
+            self.governor
+                .look_ahead(ahead.place(self.axes), ratios.feed);
         }
     }
 
@@ -331,6 +330,7 @@ impl PlanFollower {
         let path = self.cursor.path_derivatives();
         let ahead = self
             .cursor
+            .ahead()
             .planned_after(self.governor.sigma() * self.period_s);
         let limit = self.plan_limit().min(self.request.max_rate);
         self.ask_for_rate(limit);
@@ -372,11 +372,10 @@ impl PlanFollower {
                 rest_at: None,
             },
         };
-        let (governor, horizon) = (&mut self.governor, &self.horizon);
         let recent = self.cursor.recent_steps();
-        let chosen = self.cursor.on_plan_ahead(self.axes, |place| {
-            governor.smooth(&aim, horizon, place, recent)
-        });
+        let ahead = self.cursor.ahead();
+        let place = ahead.place(self.axes);
+        let chosen = self.governor.smooth(&aim, &self.horizon, place, recent);
         self.chosen.is_jerk_relaxed = chosen.relaxed;
         chosen.delta_s
     }
@@ -400,7 +399,10 @@ impl PlanFollower {
     fn rate_below(&mut self, delta_s: f64, ratios: &Ratios) -> f64 {
         let (mut rate, mut from_mm) = (f64::INFINITY, self.cursor.path_mm());
         for period in 1..=BEGINNING_PERIODS {
-            let ahead = self.cursor.planned_after(f64::from(period) * delta_s);
+            let ahead = self
+                .cursor
+                .ahead()
+                .planned_after(f64::from(period) * delta_s);
             let fastest = ahead
                 .speed_mm_per_s
                 .max((ahead.path_mm - from_mm) / delta_s);
@@ -501,7 +503,7 @@ impl PlanFollower {
     /// What is asked of a period in which `delta_s` of program time passes.
     fn asked_of_period(&mut self, delta_s: f64, ratios: &Ratios, way_speed_mm_per_s: f64) -> Asked {
         let from_mm = self.cursor.path_mm();
-        let ahead = self.cursor.planned_after(delta_s);
+        let ahead = self.cursor.ahead().planned_after(delta_s);
         let keeps = ratios.feed >= self.max_feed_ratio;
         let allowed_mm_per_s = if keeps {
             f64::INFINITY

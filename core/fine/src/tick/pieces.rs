@@ -58,8 +58,9 @@ impl PlanFollower {
             left_s: self.period_s,
             passed_s: 0.0,
         };
-        cursor.pieces(|segment, from_s| {
-            let whole_s = segment.duration_s - from_s;
+        for piece in cursor.ahead().pieces() {
+            let (segment, from_s) = (piece.segment, piece.from_s);
+            let whole_s = piece.duration_s();
             let piece_s = whole_s.min(laid.sigma * laid.left_s);
             if piece_s > 0.0 {
                 let target = piece_target(
@@ -83,8 +84,10 @@ impl PlanFollower {
                 let sigma = governor.choose_within(laid.sigma, target, points, shortest_s);
                 laid.pass(whole_s, sigma, shortest_s);
             }
-            laid.left_s > 0.0 && laid.sigma > 0.0
-        });
+            if laid.left_s <= 0.0 || laid.sigma <= 0.0 {
+                break;
+            }
+        }
         points.covered_s = covered_s;
         governor.take(laid.sigma);
         laid.passed_s
