@@ -68,18 +68,22 @@ impl Horizon {
         self.clear();
         let step_s = self.reach_s / Self::GRID as f64;
         let mut grid_s = period_s + step_s;
+        let reach_s = self.reach_s;
         for piece in ahead.pieces() {
-            let (segment, duration_s) = (piece.segment, piece.duration_s());
-            let is_in_period = piece.offset_s < period_s;
-            if (is_in_period && self.is_full()) || !(is_in_period || grid_s <= self.reach_s) {
+            let duration_s = piece.duration_s();
+            let end_s = piece.offset_s + duration_s;
+            if piece.offset_s < period_s {
+                if self.is_full() {
+                    return;
+                }
+                let stretch_s = duration_s.min(period_s - piece.offset_s);
+                self.stretch(piece.segment, piece.from_s, stretch_s, piece.offset_s);
+            } else if grid_s > reach_s {
                 return;
             }
-            if is_in_period {
-                let stretch_s = duration_s.min(period_s - piece.offset_s);
-                self.stretch(segment, piece.from_s, stretch_s, piece.offset_s);
-            }
-            while grid_s <= piece.offset_s + duration_s && grid_s <= self.reach_s {
-                self.point(segment, piece.from_s + (grid_s - piece.offset_s), grid_s);
+            while grid_s <= end_s && grid_s <= reach_s {
+                let local_s = piece.from_s + (grid_s - piece.offset_s);
+                self.point(piece.segment, local_s, grid_s);
                 grid_s += step_s;
             }
         }
@@ -123,13 +127,15 @@ impl Horizon {
         let point = &mut self.list[self.count];
         point.offset_s = offset_s;
         let mut per_speed = f64::INFINITY;
-        point.motion.look_at(segment, t_s, self.axes);
-        let motion = &point.motion;
+        let motion = &mut point.motion;
         for axis in 0..self.axes {
-            per_speed = per_speed.min(self.jerk[axis] / motion.velocity[axis].abs());
-            let steady = motion.acceleration[axis].abs()
-                < STRAIGHT_ON_SHARE * self.acceleration[axis]
-                && motion.jerk[axis].abs() < STRAIGHT_ON_SHARE * self.jerk[axis];
+            let [velocity, acceleration, jerk] = derivatives(&segment.coefficients[axis], t_s);
+            motion.velocity[axis] = velocity;
+            motion.acceleration[axis] = acceleration;
+            motion.jerk[axis] = jerk;
+            per_speed = per_speed.min(self.jerk[axis] / velocity.abs());
+            let steady = acceleration.abs() < STRAIGHT_ON_SHARE * self.acceleration[axis]
+                && jerk.abs() < STRAIGHT_ON_SHARE * self.jerk[axis];
             if !steady {
                 self.approach_jerk_share = APPROACH_JERK_SHARE;
             }

@@ -60,6 +60,9 @@ impl PeriodPoints {
     /// Collects where the plan goes within `horizon_s` of program time.
     pub fn fill(&mut self, ahead: &Ahead<'_>, horizon_s: f64) {
         self.clear();
+        if horizon_s <= 0.0 && ahead.is_at_rest() {
+            return;
+        }
         let mut left_s = horizon_s;
         for piece in ahead.pieces() {
             if self.count > 0 && (left_s <= 0.0 || self.is_full()) {

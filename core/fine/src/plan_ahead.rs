@@ -1,5 +1,7 @@
 //! The plan ahead as it is queued, without moving on it: the pieces of it from here on, one after the other ([`Ahead::pieces`]),
-//! or a place that moves to and fro on it ([`PlanCursor`]), on which changes of σ are tried before they are begun.
+//! or a place that moves on along it ([`PlanCursor`]), on which changes of σ are tried before they are begun.
+
+use std::slice::Iter;
 
 use rtrb::chunks::ReadChunk;
 use tandem_rings::{MAX_ENTRIES, Queued};
@@ -36,13 +38,54 @@ pub struct Piece<'a> {
 
 impl Piece<'_> {
     /// Its duration, s.
+    #[inline]
     pub fn duration_s(&self) -> f64 {
         self.segment.duration_s - self.from_s
     }
 
     /// Whether the plan rests at its end.
+    #[inline]
     pub fn ends_at_rest(&self) -> bool {
         ends(self.segment)
+    }
+}
+
+/// The pieces of the plan ahead, nearest first.
+#[derive(Debug)]
+pub struct Pieces<'a> {
+    here: Option<(&'a Segment, f64)>,
+    first: Iter<'a, Queued>,
+    second: Iter<'a, Queued>,
+    offset_s: f64,
+    /// The last piece ends at rest.
+    over: bool,
+}
+
+impl<'a> Iterator for Pieces<'a> {
+    type Item = Piece<'a>;
+
+    #[inline]
+    fn next(&mut self) -> Option<Piece<'a>> {
+        if self.over {
+            return None;
+        }
+        let (segment, from_s) = match self.here.take() {
+            Some(here) => here,
+            None => loop {
+                match self.first.next().or_else(|| self.second.next())? {
+                    Queued::Segment { segment, .. } => break (segment, 0.0),
+                    Queued::Event(_) => {}
+                }
+            },
+        };
+        let piece = Piece {
+            segment,
+            from_s,
+            offset_s: self.offset_s,
+        };
+        self.offset_s += piece.duration_s();
+        self.over = piece.ends_at_rest();
+        Some(piece)
     }
 }
 
@@ -62,26 +105,22 @@ impl<'a> Ahead<'a> {
         }
     }
 
+    /// Whether the machine rests in the plan, before what is queued.
+    pub fn is_at_rest(&self) -> bool {
+        self.local_s.is_none()
+    }
+
     /// The pieces of the plan from here on, up to the one that ends at rest: as many as a period looks at.
-    pub fn pieces(&self) -> impl Iterator<Item = Piece<'_>> {
-        let here = self.local_s.map(|local_s| (self.segment, local_s));
-        let entries = self.entries_from(self.first).take(LOOK_ENTRIES);
-        let segments = entries.filter_map(|queued| match queued {
-            Queued::Segment { segment, .. } => Some((segment, 0.0)),
-            Queued::Event(_) => None,
-        });
-        let (mut offset_s, mut over) = (0.0, false);
-        here.into_iter()
-            .chain(segments)
-            .map_while(move |(segment, from_s)| {
-                let piece = Piece {
-                    segment,
-                    from_s,
-                    offset_s,
-                };
-                offset_s += piece.duration_s();
-                (!std::mem::replace(&mut over, piece.ends_at_rest())).then_some(piece)
-            })
+    #[inline]
+    pub fn pieces(&self) -> Pieces<'_> {
+        let [first, second] = self.at_most(LOOK_ENTRIES);
+        Pieces {
+            here: self.local_s.map(|local_s| (self.segment, local_s)),
+            first: first.iter(),
+            second: second.iter(),
+            offset_s: 0.0,
+            over: false,
+        }
     }
 
     /// The queued entries from `number` on, counted from the start; events are among them.
@@ -97,6 +136,15 @@ impl<'a> Ahead<'a> {
             .map_or((&[], &[]), ReadChunk::as_slices)
     }
 
+    /// The first `most` entries, or all of them.
+    #[inline]
+    fn at_most(&self, most: usize) -> [&[Queued]; 2] {
+        let (first, second) = self.slices();
+        let in_first = first.len().min(most);
+        let in_second = second.len().min(most - in_first);
+        [&first[..in_first], &second[..in_second]]
+    }
+
     /// The next segment queued of `epoch` or a later one.
     pub fn next_segment(&self, epoch: u32) -> Option<&Segment> {
         let mut entries = self.entries_from(self.first).take(LOOK_ENTRIES);
@@ -108,10 +156,7 @@ impl<'a> Ahead<'a> {
 
     /// A place on the plan, where the machine is. `axes` axes are looked at, those of the mask `linear` are linear ones.
     pub fn place(&self, axes: (usize, u32)) -> PlanCursor<'_> {
-        let (first, second) = self.slices();
-        let in_first = first.len().min(PLACE_ENTRIES);
-        let in_second = second.len().min(PLACE_ENTRIES - in_first);
-        let queued = [&first[..in_first], &second[..in_second]];
+        let queued = self.at_most(PLACE_ENTRIES);
         PlanAhead::new(self.segment, queued, axes)
             .begin(self.local_s.unwrap_or(self.segment.duration_s))
     }
@@ -212,7 +257,7 @@ pub struct Motion {
 
 impl Motion {
     /// That of `segment` at local time `local_s`, for its first `axes` axes; others stay as they are.
-    pub fn look_at(&mut self, segment: &Segment, local_s: f64, axes: usize) {
+    fn look_at(&mut self, segment: &Segment, local_s: f64, axes: usize) {
         for axis in 0..axes {
             let [velocity, acceleration, jerk] = derivatives(&segment.coefficients[axis], local_s);
             (

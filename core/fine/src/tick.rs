@@ -1,6 +1,7 @@
 //! The fine loop itself.
 
 mod attach;
+mod drives;
 mod exchange;
 mod follow;
 mod govern;
@@ -28,23 +29,21 @@ use tandem_rings::{
     Controls, Counters, Depth, FineEnd, MachineState, OperatorInputs, Rest, Sample, Status,
     StopCause, StrategyRequest, Switched, SwitchedBy,
 };
-use tandem_sdk::{
-    Arm, AxisVector, Driver, Feedback, JointState, Kinematics, PluginError, Setpoint,
-};
+use tandem_sdk::{Arm, AxisVector, Driver, JointState, Kinematics, PluginError};
 
 use crate::config::FineConfig;
 use crate::cursor::Cursor;
 use crate::edge::EdgeWatch;
 use crate::fault::{Fault, FaultKind};
 use crate::guard::Guard;
-use crate::history::History;
 use crate::outputs::Outputs;
 use crate::ramp::Ramp;
 use crate::state::{self, Input};
 use attach::Attach;
+use drives::Drives;
 use govern::PlanFollower;
 use hand_over::HandOver;
-use joints::Lead;
+use joints::{JointSpace, Lead};
 use keep_alive::KeepAlive;
 use missed::Missed;
 use progress::Progress;
@@ -87,9 +86,8 @@ enum Phase {
 #[allow(clippy::struct_excessive_bools)] // each is about something else
 pub struct FineLoop {
     config: FineConfig,
-    driver: Box<dyn Driver>,
-    kinematics: Option<Box<dyn Kinematics>>,
-    joints: usize,
+    drives: Drives,
+    space: JointSpace,
     controls: Arc<Controls>,
     given: OperatorInputs,
     cause: StopCause,
@@ -103,8 +101,6 @@ pub struct FineLoop {
     /// Something has moved since the last hold between two lines.
     line_moves: bool,
     guard: Guard,
-    /// What the drives are sent beyond the axes' coordinates: homing has found it, mm or rad per joint.
-    offset: AxisVector,
     edge: EdgeWatch,
     stop: Option<Stop>,
     keep_alive: KeepAlive,
@@ -115,26 +111,15 @@ pub struct FineLoop {
     outputs: Outputs,
     /// The drives stay enabled when the program has ended: another job may follow.
     stays: bool,
-    /// Drives hear their heartbeat from the job before: the setpoint's tick goes on from there, in every exchange.
-    beats_on: bool,
     phase: Phase,
     state: MachineState,
     queue: QueueWatch,
     tick: u64,
     attach: Attach,
-    setpoint: Setpoint,
-    feedback: Feedback,
-    /// Where the joints were told to be in the last periods, where some joint has a limit of its following error.
-    sent: Option<History>,
-    /// Where they were.
-    measured: History,
     /// What the drives are to catch.
     arm: Arm,
     release: Release,
     left: Left,
-    /// Where the axes are by the feedback, as far as the kinematics last knew.
-    axes: AxisVector,
-    lead: Lead,
     counters: Counters,
     fault: Option<Fault>,
     plugin_error: Option<PluginError>,
@@ -148,16 +133,11 @@ impl FineLoop {
         driver: Box<dyn Driver>,
         kinematics: Option<Box<dyn Kinematics>>,
     ) -> Self {
-        let judges_following = config
-            .max_following_error_mm
-            .0
-            .iter()
-            .any(|most| *most < f64::INFINITY);
+        let joints = joints::count(config, kinematics.as_deref());
         Self {
             config: *config,
-            driver,
-            joints: joints::count(config, kinematics.as_deref()),
-            kinematics,
+            drives: Drives::new(config, driver, joints),
+            space: JointSpace::new(config, kinematics),
             controls: end.controls,
             given: OperatorInputs::default(),
             cause: StopCause::None,
@@ -170,7 +150,6 @@ impl FineLoop {
             plan: PlanFollower::new(config, Cursor::new(end.segments, &config.position)),
             line_moves: false,
             guard: Guard::new(config),
-            offset: AxisVector::ZERO,
             edge: EdgeWatch::default(),
             stop: None,
             keep_alive: KeepAlive::default(),
@@ -180,24 +159,14 @@ impl FineLoop {
             spin_up: SpinUp::default(),
             outputs: Outputs::new(config.dry_run, config.unhomed),
             stays: false,
-            beats_on: false,
             phase: Phase::Waiting,
             state: MachineState::Fault,
             queue: QueueWatch::default(),
             tick: 0,
             attach: Attach::new(config),
-            setpoint: Setpoint::default(),
-            feedback: Feedback {
-                position: config.attached.position,
-                ..Feedback::default()
-            },
-            sent: judges_following.then(|| History::new(&config.attached.position)),
-            measured: History::new(&config.attached.position),
             arm: Arm::default(),
             release: Release::default(),
             left: Left::default(),
-            axes: config.axes_alone(&config.position),
-            lead: Lead::Axes,
             counters: Counters::default(),
             fault: None,
             plugin_error: None,
@@ -219,7 +188,10 @@ impl FineLoop {
         let before_mm = self.plan.cursor.path_mm();
         let (position, input) = self.next_position();
         let all_hold = self.exchange(&position);
-        self.state = state::next(state::next(self.state, self.drives(all_hold)), input);
+        self.state = state::next(
+            state::next(self.state, self.input_of_drives(all_hold)),
+            input,
+        );
         let started = !(waiting && matches!(self.phase, Phase::Waiting));
         let recorded =
             (self.outputs.unhomed == 0 || self.config.record_drives) && self.handed_over() == 0;
@@ -242,8 +214,10 @@ impl FineLoop {
     pub fn reset(&mut self) {
         self.state = state::next(self.state, Input::Reset);
         if matches!(self.phase, Phase::Faulted) {
-            self.attach = Attach::again(self.feedback.position);
-            (self.fault, self.plugin_error, self.lead) = (None, None, Lead::Axes);
+            self.attach = Attach::again(self.drives.feedback.position);
+            self.fault = None;
+            self.plugin_error = None;
+            self.space.lead = Lead::Axes;
             self.release = Release::default();
             self.plan.forget_rate(&self.config);
             self.progress = Progress::new(&self.config);
@@ -259,7 +233,7 @@ impl FineLoop {
 
     /// How much later than its bus wants it the last exchange was, ns; `None` as long as no driver tells. Fine thread.
     pub fn phase_ns(&self) -> Option<i64> {
-        (self.feedback.has_phase != 0).then_some(self.feedback.phase_ns)
+        self.drives.phase_ns()
     }
 
     /// What was counted so far.
@@ -289,12 +263,12 @@ impl FineLoop {
 
     /// The driver, for what its codes mean. Host, between ticks.
     pub fn driver(&self) -> &dyn Driver {
-        self.driver.as_ref()
+        self.drives.driver()
     }
 
     /// Whether the driver did not reach the drive of some joint in the last exchange. Host.
     pub fn has_lost_joints(&self) -> bool {
-        self.feedback.state[..self.joints].contains(&JointState::Lost)
+        self.drives.feedback.state[..self.drives.joints].contains(&JointState::Lost)
     }
 
     /// What was switched last. The period that ends a program switches, and has no sample. Host.
@@ -304,7 +278,7 @@ impl FineLoop {
 
     /// Hands the driver back. Host.
     pub fn into_driver(self) -> Box<dyn Driver> {
-        self.driver
+        self.drives.into_driver()
     }
 
     fn next_position(&mut self) -> (AxisVector, Input) {
@@ -370,7 +344,7 @@ impl FineLoop {
                 self.outputs
                     .switch_off(self.config.kept_outputs, SwitchedBy::Fault);
             }
-            self.driver.quick_stop();
+            self.drives.quick_stop();
             self.phase = Phase::Faulted;
         }
         position

@@ -99,8 +99,9 @@ impl FineLoop {
     pub(super) fn hold_still(&mut self) -> AxisVector {
         let may_hold = self.fault.is_none() && !self.is_letting_go() && self.may_enable();
         let enables = self.attach.stage == Stage::Enabling && may_hold;
-        self.setpoint.enable = u32::from(enables);
-        self.setpoint.reset = u32::from(self.attach.stage == Stage::Resetting && !self.attach.told);
+        self.drives.setpoint.enable = u32::from(enables);
+        self.drives.setpoint.reset =
+            u32::from(self.attach.stage == Stage::Resetting && !self.attach.told);
         self.attach.told = true;
         self.attach.joints
     }
@@ -111,21 +112,21 @@ impl FineLoop {
             return;
         }
         self.attach.periods += 1;
-        let states: [JointState; MAX_AXES] = self.feedback.state;
-        for (joint, state) in states.iter().enumerate().take(self.joints) {
+        let states: [JointState; MAX_AXES] = self.drives.feedback.state;
+        for (joint, state) in states.iter().enumerate().take(self.drives.joints) {
             let (bit, holds) = (1 << joint, *state == JointState::Enabled);
             if !holds {
                 self.attach.held &= !bit;
-                self.attach.joints[joint] = self.feedback.position[joint];
+                self.attach.joints[joint] = self.drives.feedback.position[joint];
             } else if self.attach.stage == Stage::Enabling {
                 self.attach.held |= bit;
             }
         }
         match self.attach.stage {
-            Stage::Resetting if !states[..self.joints].contains(&JointState::Fault) => {
+            Stage::Resetting if !states[..self.drives.joints].contains(&JointState::Fault) => {
                 self.attach.stage = Stage::Enabling;
             }
-            Stage::Enabling if self.attach.held.count_ones() as usize == self.joints => {
+            Stage::Enabling if self.attach.held.count_ones() as usize == self.drives.joints => {
                 self.stand_there();
             }
             _ => self.watch_time(&states),
@@ -137,14 +138,14 @@ impl FineLoop {
         if self.attach.periods < self.config.enable_periods {
             return;
         }
-        let late = states[..self.joints]
+        let late = states[..self.drives.joints]
             .iter()
             .position(|state| *state != JointState::Enabled);
         let joint = late.unwrap_or_default();
         self.fail(FaultKind::NotEnabled {
             joint,
             state: states[joint],
-            code: self.feedback.fault_code[joint],
+            code: self.drives.feedback.fault_code[joint],
         });
     }
 
@@ -169,7 +170,7 @@ impl FineLoop {
         let joints = self.attach.joints;
         self.attach.stage = Stage::Done;
         let position = *self.guard.position();
-        if self.joints_of(&position).0[..self.joints] != joints.0[..self.joints] {
+        if self.joints_of(&position).0[..self.drives.joints] != joints.0[..self.drives.joints] {
             self.stand_at(&joints);
         }
         if self.fault.is_none() && self.config.plans_from_rest {
@@ -189,8 +190,8 @@ impl FineLoop {
             Joints::Curved { .. } => self.add_joints(&mut position),
         }
         let beside = *joints - self.joints_of(&position);
-        for joint in (0..self.joints).filter(|joint| beside[*joint].abs() > ROUNDING) {
-            self.offset[joint] += beside[joint];
+        for joint in (0..self.drives.joints).filter(|joint| beside[*joint].abs() > ROUNDING) {
+            self.space.offset[joint] += beside[joint];
         }
         self.guard.place(&position);
     }

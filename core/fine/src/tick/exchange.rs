@@ -4,10 +4,10 @@ use std::iter::once_with;
 use std::sync::atomic::Ordering::Relaxed;
 
 use tandem_rings::{Sample, Switched};
-use tandem_sdk::{AxisVector, JointState};
+use tandem_sdk::AxisVector;
 
 use super::{FineLoop, Left, Phase};
-use crate::answer::{self, Numbers};
+use crate::answer;
 use crate::fault::FaultKind;
 use crate::state::Input;
 
@@ -15,26 +15,19 @@ impl FineLoop {
     /// Exchanges setpoints and feedback with the drives. Returns whether all joints hold afterwards.
     pub(super) fn exchange(&mut self, axes: &AxisVector) -> bool {
         self.set_joints(axes);
-        self.setpoint.tick = if self.beats_on {
-            self.setpoint.tick + 1
-        } else {
-            self.tick
-        };
-        self.setpoint.arm = self.arm;
+        self.drives.setpoint.arm = self.arm;
         // Where axes are homed, joints are axes.
-        self.setpoint.limited = self.outputs.unhomed & self.config.homing_limits;
-        self.setpoint.outputs = self.outputs.bits;
-        self.setpoint.spindle_rad_per_s = self.spindle_rad_per_s();
-        let last = Numbers::of(&self.feedback);
-        let failed = self.ask_driver();
+        self.drives.setpoint.limited = self.outputs.unhomed & self.config.homing_limits;
+        self.drives.setpoint.outputs = self.outputs.bits;
+        self.drives.setpoint.spindle_rad_per_s = self.spindle_rad_per_s();
+        let exchanged = self.drives.exchange(self.tick, &mut self.plugin_error);
+        let failed = exchanged.failed;
         self.hear_roles(failed);
         self.hear_spindle();
-        let unreadable =
-            last.replace_wrong_ones(&mut self.feedback, self.measured.last(), self.joints);
-        self.remember();
+        self.report_bus(exchanged.age_periods);
         // What is true nearly always is looked at first.
-        let all_hold = answer::all_hold(&self.feedback, self.joints);
-        if (failed || unreadable.is_some() || !all_hold || self.sent.is_some())
+        let (unreadable, all_hold) = (exchanged.unreadable, exchanged.all_hold);
+        if (failed || unreadable.is_some() || !all_hold || self.drives.sent.is_some())
             && let Some(kind) = self.fault_of_answer(failed, unreadable)
         {
             self.fail(kind);
@@ -58,15 +51,18 @@ impl FineLoop {
         let (holding, letting_go) = (self.attach.is_done(), self.is_letting_go());
         let resets = self.is_resetting();
         let reported = || {
-            answer::reported(&self.feedback, self.joints, moving, own)
+            answer::reported(&self.drives.feedback, self.drives.joints, moving, own)
                 .filter(|_| !resets && !letting_go)
         };
         let far = || {
-            let sent = (self.sent.as_ref()?, &self.config.attached.delay_periods);
+            let sent = (
+                self.drives.sent.as_ref()?,
+                &self.config.attached.delay_periods,
+            );
             answer::following(
-                &self.feedback,
+                &self.drives.feedback,
                 sent,
-                self.joints,
+                self.drives.joints,
                 &self.config.max_following_error_mm,
                 own,
             )
@@ -86,61 +82,33 @@ impl FineLoop {
             None
         };
         if let Some(joints) = still {
-            // They are told to be where they stand: that is no motion, though the numbers may change.
-            self.setpoint.position = joints;
-            (self.setpoint.velocity, self.setpoint.acceleration) =
-                (AxisVector::ZERO, AxisVector::ZERO);
+            self.drives.tell_to_stand(&joints);
             return;
         }
-        self.setpoint.homing = 0;
-        let (joints, rate) = (self.joints_of(axes), 1.0 / self.config.period_s);
-        let velocity = (joints - self.setpoint.position) * rate;
-        self.setpoint.acceleration = (velocity - self.setpoint.velocity) * rate;
-        (self.setpoint.position, self.setpoint.velocity) = (joints, velocity);
-        self.setpoint.enable = u32::from(!self.is_letting_go());
-        self.setpoint.reset = 0;
+        let joints = self.joints_of(axes);
+        self.drives
+            .tell_to_move(&joints, 1.0 / self.config.period_s);
+        self.drives.setpoint.homing = 0;
+        self.drives.setpoint.enable = u32::from(!self.is_letting_go());
+        self.drives.setpoint.reset = 0;
     }
 
-    /// Keeps what was sent, where it is asked for, and what came back of it.
-    fn remember(&mut self) {
-        if let Some(sent) = &mut self.sent {
-            sent.push(&self.setpoint.position);
-        }
-        self.measured.push(&self.feedback.position);
-        let ages = self.feedback.age_periods[..self.joints].iter();
-        let age_periods = ages.fold(0, |oldest: u32, age| oldest.max(*age));
+    /// How old what the drives have answered is, and how late the exchange was.
+    fn report_bus(&mut self, age_periods: u32) {
         self.counters.old_feedback_periods += u64::from(age_periods > 0);
         let bus = &self.status.bus;
         bus.age_periods.store(age_periods, Relaxed);
         if age_periods > 0 {
             bus.old_periods.fetch_add(1, Relaxed);
         }
-        bus.has_phase.store(self.feedback.has_phase != 0, Relaxed);
-        bus.phase_ns.store(self.feedback.phase_ns, Relaxed);
-    }
-
-    /// Whether the exchange failed; the driver's first words about it are kept for the host.
-    fn ask_driver(&mut self) -> bool {
-        match self.driver.exchange(&self.setpoint, &mut self.feedback) {
-            Ok(()) => false,
-            Err(error) => {
-                self.plugin_error.get_or_insert(error);
-                true
-            }
-        }
+        let feedback = &self.drives.feedback;
+        bus.has_phase.store(feedback.has_phase != 0, Relaxed);
+        bus.phase_ns.store(feedback.phase_ns, Relaxed);
     }
 
     /// What the drives do for the state of the machine, where `all_hold` or not all of them do.
-    pub(super) fn drives(&self, all_hold: bool) -> Input {
-        if all_hold {
-            return Input::DrivesOn;
-        }
-        let own = self.handed_over();
-        let holds = |joint: usize| {
-            own >> joint & 1 == 1 || self.feedback.state[joint] == JointState::Enabled
-        };
-        let on = (0..self.joints).all(holds);
-        if on {
+    pub(super) fn input_of_drives(&self, all_hold: bool) -> Input {
+        if all_hold || self.drives.hold_others_than(self.handed_over()) {
             Input::DrivesOn
         } else {
             Input::DrivesOff
@@ -149,9 +117,9 @@ impl FineLoop {
 
     pub(super) fn publish(&mut self, command: &AxisVector, feed_mm_per_s: f64) {
         let (command, feedback) = if self.config.record_drives {
-            (*command + self.offset, self.feedback.position)
+            (*command + self.space.offset, self.drives.feedback.position)
         } else {
-            let reported = self.feedback.position;
+            let reported = self.drives.feedback.position;
             (self.config.axes_alone(command), self.axes_of(&reported))
         };
         let (switched, phase_ns) = (self.switched(), self.phase_ns());
@@ -163,21 +131,21 @@ impl FineLoop {
             state: self.state,
             command,
             feedback,
-            speed: self.feedback.speed,
-            current_a: self.feedback.current_a,
+            speed: self.drives.feedback.speed,
+            current_a: self.drives.feedback.current_a,
             feed_mm_per_s,
             end_feed_mm_per_s: self.plan.governor.sigma() * self.plan.cursor.path_speed_mm_per_s(),
             programmed_feed_mm_per_s: self.plan.cursor.segment().feed_mm_per_s,
             sigma: self.plan.governor.sigma(),
             ratio,
             feed_override,
-            spindle_rad_per_s: self.feedback.spindle_rad_per_s,
+            spindle_rad_per_s: self.drives.feedback.spindle_rad_per_s,
             switched,
             phase_ns,
-            analog: self.feedback.analog,
-            inputs: self.feedback.inputs,
-            old_inputs: answer::old_inputs(&self.feedback),
-            age_periods: answer::ages(&self.feedback, self.joints),
+            analog: self.drives.feedback.analog,
+            inputs: self.drives.feedback.inputs,
+            old_inputs: answer::old_inputs(&self.drives.feedback),
+            age_periods: answer::ages(&self.drives.feedback, self.drives.joints),
             cause: self.cause,
             given: self.given,
         };
@@ -199,8 +167,8 @@ impl FineLoop {
     /// What was sent last.
     pub(super) fn switched(&self) -> Switched {
         Switched {
-            outputs: self.setpoint.outputs,
-            spindle_rad_per_s: self.setpoint.spindle_rad_per_s,
+            outputs: self.drives.setpoint.outputs,
+            spindle_rad_per_s: self.drives.setpoint.spindle_rad_per_s,
             by: self.outputs.by,
         }
     }
@@ -234,7 +202,7 @@ impl FineLoop {
         status.feed_mm_per_s.store(feed_mm_per_s);
         status.line.store(self.plan.cursor.segment().line, Relaxed);
         status.state.store(self.state as u32, Relaxed);
-        status.inputs.store(self.feedback.inputs, Relaxed);
+        status.inputs.store(self.drives.feedback.inputs, Relaxed);
         status
             .spindle
             .waits
@@ -242,13 +210,16 @@ impl FineLoop {
         status
             .spindle
             .told_rad_per_s
-            .store(self.setpoint.spindle_rad_per_s);
+            .store(self.drives.setpoint.spindle_rad_per_s);
         status
             .spindle
             .turns_rad_per_s
-            .store(self.feedback.spindle_rad_per_s);
-        for (joint, status) in status.joints.iter().enumerate().take(self.joints) {
-            status.store(self.feedback.state[joint], self.feedback.fault_code[joint]);
+            .store(self.drives.feedback.spindle_rad_per_s);
+        for (joint, status) in status.joints.iter().enumerate().take(self.drives.joints) {
+            status.store(
+                self.drives.feedback.state[joint],
+                self.drives.feedback.fault_code[joint],
+            );
         }
         status
             .enabling

@@ -164,11 +164,12 @@ impl PlanFollower {
     }
 
     /// Chooses the rate for this period.
-    pub(super) fn govern(&mut self, request: Request) -> Governed {
+    #[inline]
+    pub(super) fn govern(&mut self, request: Request) -> &Governed {
         self.request = request;
         self.chosen = Governed::NOTHING;
         self.chosen.delta_s = self.choose();
-        self.chosen
+        &self.chosen
     }
 
     /// Chooses the rate; gives the program time that passes, s.

@@ -8,7 +8,6 @@ use tandem_sdk::{AxisVector, JointState};
 use super::rest::Stop;
 use super::{FineLoop, Phase};
 use crate::fault::FaultKind;
-use crate::history::History;
 use crate::state::Input;
 
 /// A joint in its drive's hands.
@@ -37,10 +36,10 @@ impl FineLoop {
             .hand_over
             .filter(|_| self.plan.cursor.is_resting())?;
         self.outputs.hand_over = None;
-        if joint >= self.joints {
+        if joint >= self.drives.joints {
             return None;
         }
-        let begun = self.feedback.homed >> joint & 1 == 0;
+        let begun = self.drives.feedback.homed >> joint & 1 == 0;
         let (periods, given_up, told, held) = (0, false, false, false);
         self.phase = Phase::HandedOver(HandOver {
             joint,
@@ -61,10 +60,11 @@ impl FineLoop {
     }
 
     fn look_at_hand(&mut self, mut hand: HandOver) -> Input {
-        let (bit, state) = (1_u32 << hand.joint, self.feedback.state[hand.joint]);
-        let is_new = self.feedback.age_periods[hand.joint] == 0;
-        hand.begun |= is_new && (state == JointState::Homing || self.feedback.homed & bit == 0);
-        let homed = hand.told && hand.begun && self.feedback.homed & bit != 0;
+        let (bit, state) = (1_u32 << hand.joint, self.drives.feedback.state[hand.joint]);
+        let is_new = self.drives.feedback.age_periods[hand.joint] == 0;
+        hand.begun |=
+            is_new && (state == JointState::Homing || self.drives.feedback.homed & bit == 0);
+        let homed = hand.told && hand.begun && self.drives.feedback.homed & bit != 0;
         hand.given_up |= self.given.abort || self.is_jog_let_go();
         if is_new && state == JointState::Enabled && (homed || hand.given_up) {
             self.take_back(hand.joint);
@@ -78,12 +78,12 @@ impl FineLoop {
         let held = self.given.hold || self.given.program_hold;
         hand.told = !hand.given_up && !held;
         hand.periods += u64::from(!held);
-        self.setpoint.homing = if hand.told { bit } else { 0 };
+        self.drives.setpoint.homing = if hand.told { bit } else { 0 };
         if hand.periods as f64 * self.config.period_s > hand.within_s {
             let (joint, within_s, code) = (
                 hand.joint,
                 hand.within_s,
-                self.feedback.fault_code[hand.joint],
+                self.drives.feedback.fault_code[hand.joint],
             );
             self.fail(FaultKind::NotHomed {
                 joint,
@@ -125,12 +125,12 @@ impl FineLoop {
         let mut joints = self.joints_of(axes);
         if let Phase::HandedOver(hand) = &mut self.phase {
             let joint = hand.joint;
-            let holds = !hand.told && self.feedback.state[joint] == JointState::Enabled;
+            let holds = !hand.told && self.drives.feedback.state[joint] == JointState::Enabled;
             let stays = holds && hand.held;
             joints[joint] = if stays {
-                self.setpoint.position[joint]
+                self.drives.setpoint.position[joint]
             } else {
-                self.feedback.position[joint]
+                self.drives.feedback.position[joint]
             };
             hand.held = holds;
         }
@@ -139,14 +139,11 @@ impl FineLoop {
 
     /// The machine stands where the drive says that its joint is. What was sent before is no way from there to here.
     fn take_back(&mut self, joint: usize) {
-        self.setpoint.homing = 0;
+        self.drives.setpoint.homing = 0;
         let mut joints = self.joints_of(self.guard.position());
-        joints[joint] = self.feedback.position[joint];
-        self.offset[joint] = 0.0;
+        joints[joint] = self.drives.feedback.position[joint];
+        self.space.offset[joint] = 0.0;
         self.stand_at(&joints);
-        (self.setpoint.position, self.setpoint.velocity) = (joints, AxisVector::ZERO);
-        if let Some(sent) = &mut self.sent {
-            *sent = History::new(&joints);
-        }
+        self.drives.forget_way(&joints);
     }
 }

@@ -1,6 +1,6 @@
 //! Axes to joints and back, and what happens where the kinematics know neither.
 
-use tandem_sdk::{AxisVector, Kinematics};
+use tandem_sdk::{AxisVector, Kinematics, PluginError};
 
 use super::FineLoop;
 use crate::config::{FineConfig, Joints};
@@ -29,27 +29,108 @@ pub(super) fn count(config: &FineConfig, kinematics: Option<&dyn Kinematics>) ->
     }
 }
 
-impl FineLoop {
+/// Axes to joints and back, with what homing has found between the two.
+pub(super) struct JointSpace {
+    /// `None` where joints are axes.
+    kinematics: Option<Box<dyn Kinematics>>,
+    /// What the drives are sent beyond the axes' coordinates: homing has found it, mm or rad per joint.
+    pub(super) offset: AxisVector,
+    /// Where the axes are by the feedback, as far as the kinematics last knew.
+    pub(super) axes: AxisVector,
+    pub(super) lead: Lead,
+}
+
+impl JointSpace {
+    /// With the axes where the machine stands. Host.
+    pub(super) fn new(config: &FineConfig, kinematics: Option<Box<dyn Kinematics>>) -> Self {
+        Self {
+            kinematics,
+            offset: AxisVector::ZERO,
+            axes: config.axes_alone(&config.position),
+            lead: Lead::Axes,
+        }
+    }
+
+    /// Whether `other` makes joints of axes the same way.
+    pub(super) fn is_like(&self, other: &Self) -> bool {
+        self.kinematics.is_some() == other.kinematics.is_some()
+    }
+
+    /// What homing has found for the loop before.
+    pub(super) fn take_over(&mut self, last: &Self) {
+        self.offset = last.offset;
+        self.axes = last.axes;
+    }
+
     /// Where the joints are to be in the sample `position`: where there are no kinematics, where the axes are.
     #[inline]
-    pub(super) fn joints_of(&self, position: &AxisVector) -> AxisVector {
+    fn joints_of(&self, config: &FineConfig, position: &AxisVector) -> AxisVector {
         match &self.kinematics {
             None => *position + self.offset,
-            Some(kinematics) => self.joints_by(kinematics.as_ref(), position),
+            Some(kinematics) => self.joints_by(kinematics.as_ref(), config, position),
         }
     }
 
     /// Kinematics that are not linear have been asked by [`FineLoop::add_joints`], and the guard has seen what they
     /// answered: they are not asked again.
     #[inline(never)]
-    fn joints_by(&self, kinematics: &dyn Kinematics, position: &AxisVector) -> AxisVector {
-        let joints = match self.config.joints {
+    fn joints_by(
+        &self,
+        kinematics: &dyn Kinematics,
+        config: &FineConfig,
+        position: &AxisVector,
+    ) -> AxisVector {
+        let joints = match config.joints {
             Joints::Curved { axes } => {
-                AxisVector::from_slice(&position.0[axes..self.config.lane_count()])
+                AxisVector::from_slice(&position.0[axes..config.lane_count()])
             }
-            _ => kinematics.to_joints(&self.config.axes_alone(position)),
+            _ => kinematics.to_joints(&config.axes_alone(position)),
         };
         joints + self.offset
+    }
+
+    /// Joints of the axes at `position`, where the kinematics alone know them and are still asked.
+    fn ask(&self, position: &AxisVector) -> Option<AxisVector> {
+        let kinematics = self.kinematics.as_ref()?;
+        (self.lead == Lead::Axes).then(|| kinematics.to_joints(position))
+    }
+
+    /// Axis coordinates of `joints`, of `axes` axes, mm or rad; the first axis that the kinematics do not know, where that is one.
+    #[inline(never)]
+    fn axes_of(&mut self, axes: usize, joints: &AxisVector) -> Result<AxisVector, usize> {
+        let joints = *joints - self.offset;
+        let Some(kinematics) = &self.kinematics else {
+            return Ok(joints);
+        };
+        let found = kinematics.to_axes(&joints);
+        if let Some(axis) = (0..axes).find(|axis| !found[*axis].is_finite()) {
+            return Err(axis);
+        }
+        self.axes = found;
+        Ok(found)
+    }
+
+    /// The axes of `joints`, where kinematics that are asked for the joints there give the same ones.
+    fn found_from(&self, config: &FineConfig, joints: &AxisVector) -> Option<AxisVector> {
+        let kinematics = self.kinematics.as_ref()?;
+        let found = config.axes_alone(&kinematics.to_axes(joints));
+        let again = kinematics.to_joints(&found);
+        let count = count(config, Some(kinematics.as_ref()));
+        let leads_back = (0..count).all(|joint| (again[joint] - joints[joint]).abs() <= BACK);
+        leads_back.then_some(found)
+    }
+
+    /// What the plugin says of itself.
+    fn error(&self) -> Option<PluginError> {
+        self.kinematics.as_ref()?.health().err()
+    }
+}
+
+impl FineLoop {
+    /// Where the joints are to be in the sample `position`.
+    #[inline]
+    pub(super) fn joints_of(&self, position: &AxisVector) -> AxisVector {
+        self.space.joints_of(&self.config, position)
     }
 
     /// A sample on its way to the guard gets the joints behind the axes, where only the kinematics know them. Kinematics
@@ -64,16 +145,11 @@ impl FineLoop {
     #[inline(never)]
     fn add_curved(&mut self, axes: usize, position: &mut AxisVector) {
         *position = self.config.axes_alone(position);
-        let asked = self
-            .kinematics
-            .as_ref()
-            .filter(|_| self.lead == Lead::Axes)
-            .map(|k| k.to_joints(position));
-        let joints = match asked {
+        let joints = match self.space.ask(position) {
             Some(joints) if self.accepts(axes, position, &joints) => joints,
             _ => self.slower(axes),
         };
-        position.0[axes..self.config.lane_count()].copy_from_slice(&joints.0[..self.joints]);
+        position.0[axes..self.config.lane_count()].copy_from_slice(&joints.0[..self.drives.joints]);
     }
 
     /// Whether the joints go where the kinematics want them. Before a fault the guard decides that; on the way to rest,
@@ -83,15 +159,15 @@ impl FineLoop {
             // The plan is to blame, and the guard says so.
             return true;
         }
-        if let Some(joint) = (0..self.joints).find(|joint| !joints[*joint].is_finite()) {
-            self.lead = Lead::Nothing;
+        if let Some(joint) = (0..self.drives.joints).find(|joint| !joints[*joint].is_finite()) {
+            self.space.lead = Lead::Nothing;
             self.lose_way(FaultKind::Kinematics { joint });
         } else if self.fault.is_some()
-            && !(0..self.joints).all(|j| self.can_follow(axes + j, joints[j]))
+            && !(0..self.drives.joints).all(|j| self.can_follow(axes + j, joints[j]))
         {
-            self.lead = Lead::Nothing;
+            self.space.lead = Lead::Nothing;
         }
-        self.lead == Lead::Axes
+        self.space.lead == Lead::Axes
     }
 
     /// Whether the joint at `entry` reaches `next` within its limits of velocity and acceleration.
@@ -112,7 +188,7 @@ impl FineLoop {
     /// The joints a period later, each with less speed by its limit.
     fn slower(&self, axes: usize) -> AxisVector {
         let (period_s, mut joints) = (self.config.period_s, AxisVector::ZERO);
-        for joint in 0..self.joints {
+        for joint in 0..self.drives.joints {
             let (entry, most) = (
                 axes + joint,
                 self.config.limits.axes[axes + joint].acceleration_mm_per_s2,
@@ -127,7 +203,7 @@ impl FineLoop {
     /// Whether the joints rest when the axes do: they may have been slowing down on their own.
     pub(super) fn joints_rest(&self) -> bool {
         let first = self.config.axis_count();
-        self.lead == Lead::Axes
+        self.space.lead == Lead::Axes
             || self.guard.velocity().0[first..]
                 .iter()
                 .all(|speed| *speed == 0.0)
@@ -135,60 +211,40 @@ impl FineLoop {
 
     /// Whether the joints came to rest each on its own, away from where the axes were to be. Host.
     pub fn joints_went_alone(&self) -> bool {
-        self.lead == Lead::Nothing
+        self.space.lead == Lead::Nothing
     }
 
     /// Axis coordinates of what the drives report, mm or rad. Where the kinematics do not know, the last ones, and a fault.
     #[inline]
     pub(super) fn axes_of(&mut self, joints: &AxisVector) -> AxisVector {
-        let joints = *joints - self.offset;
-        if self.kinematics.is_none() {
-            joints
-        } else {
-            self.axes_by(&joints)
+        if self.space.kinematics.is_none() {
+            return *joints - self.space.offset;
         }
-    }
-
-    #[inline(never)]
-    fn axes_by(&mut self, joints: &AxisVector) -> AxisVector {
-        let Some(kinematics) = &self.kinematics else {
-            return *joints;
-        };
-        let axes = kinematics.to_axes(joints);
-        if let Some(axis) = (0..self.config.axis_count()).find(|axis| !axes[*axis].is_finite()) {
-            self.lose_way(FaultKind::WayBack { axis });
-        } else {
-            self.axes = axes;
+        match self.space.axes_of(self.config.axis_count(), joints) {
+            Ok(axes) => axes,
+            Err(axis) => {
+                self.lose_way(FaultKind::WayBack { axis });
+                self.space.axes
+            }
         }
-        self.axes
     }
 
     /// The position sent last, in the coordinates of the drives, which homing does not change, mm or rad. Where the joints
     /// came to rest on their own, it is what the kinematics make of them, if that leads back. Host.
     pub fn sent(&self) -> AxisVector {
         let axes = self.config.axes_alone(self.guard.position());
-        let Some(kinematics) = self
-            .kinematics
-            .as_ref()
-            .filter(|_| self.joints_went_alone())
-        else {
-            return axes + self.offset;
-        };
+        if !self.joints_went_alone() {
+            return axes + self.space.offset;
+        }
         let joints = self.joints_of(self.guard.position());
-        let found = self.config.axes_alone(&kinematics.to_axes(&joints));
-        let again = kinematics.to_joints(&found);
-        let leads_back = (0..self.joints).all(|joint| (again[joint] - joints[joint]).abs() <= BACK);
-        if leads_back { found } else { axes }
+        self.space.found_from(&self.config, &joints).unwrap_or(axes)
     }
 
     /// Faults the machine; the plugin's own words about it are kept for the host.
     #[cold]
     fn lose_way(&mut self, kind: FaultKind) {
-        if let Some(Err(error)) = self
-            .kinematics
-            .as_ref()
-            .filter(|_| self.fault.is_none())
-            .map(|k| k.health())
+        if self.fault.is_none()
+            && let Some(error) = self.space.error()
         {
             self.plugin_error.get_or_insert(error);
         }

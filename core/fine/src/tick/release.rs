@@ -36,7 +36,7 @@ impl FineLoop {
 
     /// Behind an exchange: whether it was the last. A driver that `failed` knows of no brakes.
     pub(super) fn watch_release(&mut self, failed: bool) {
-        if self.setpoint.enable != 0 || !self.is_letting_go() {
+        if self.drives.setpoint.enable != 0 || !self.is_letting_go() {
             return;
         }
         self.release.periods += 1;
@@ -49,7 +49,10 @@ impl FineLoop {
             ]
             .contains(state)
         };
-        let closed = failed || !self.feedback.state[..self.joints].iter().any(holds);
+        let closed = failed
+            || !self.drives.feedback.state[..self.drives.joints]
+                .iter()
+                .any(holds);
         self.release.is_over |= closed || self.release.periods >= self.config.disable_periods;
     }
 }

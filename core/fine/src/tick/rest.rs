@@ -94,7 +94,7 @@ impl FineLoop {
     /// Sets the position of the axes anew where the machine rests. The drives are sent what they were sent before.
     fn correct(&mut self, by: &AxisVector) {
         self.guard.correct(by);
-        self.offset = self.offset - *by;
+        self.space.offset = self.space.offset - *by;
     }
 
     /// At a rest: tells the drives what the next motion waits for. Whether they are told in this period, so that it begins in the
@@ -113,7 +113,7 @@ impl FineLoop {
     pub(super) fn begin_edge(&mut self) {
         if self.edge.begin(
             self.plan.cursor.segment(),
-            &self.feedback,
+            &self.drives.feedback,
             &self.config.home_switches,
         ) {
             self.stop.get_or_insert(Stop {
@@ -134,8 +134,8 @@ impl FineLoop {
         }
         if let Some(latch) = self.edge.find(
             stop_on,
-            &self.feedback,
-            &self.measured,
+            &self.drives.feedback,
+            &self.drives.measured,
             self.config.period_s,
             &self.config.home_switches,
         ) {

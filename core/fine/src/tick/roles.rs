@@ -39,7 +39,7 @@ impl FineLoop {
         if !self.config.roles.any() || !self.roles.heard {
             return;
         }
-        let tripped = self.config.roles.judge(&self.feedback);
+        let tripped = self.config.roles.judge(&self.drives.feedback);
         self.status.tripped.store(tripped.all, Relaxed);
         self.obey_stops(&tripped);
         // The spindle of an open door is off, whatever the axes do.
@@ -55,8 +55,8 @@ impl FineLoop {
     /// Inputs that are a fault.
     fn obey_stops(&mut self, tripped: &Tripped) {
         let roles = &self.config.roles;
-        let moves =
-            matches!(self.phase, Phase::Following) && self.setpoint.velocity != AxisVector::ZERO;
+        let moves = matches!(self.phase, Phase::Following)
+            && self.drives.setpoint.velocity != AxisVector::ZERO;
         let homes = self.outputs.unhomed != 0;
         if !moves {
             let may_leave = homes || roles.may_leave_limits;

@@ -37,8 +37,8 @@ impl FineLoop {
             return;
         };
         self.spin_up.exchanges = Some(exchanges + 1);
-        let is_there = self.has_answered() && self.feedback.spindle_at_speed != 0;
-        if is_there || self.setpoint.spindle_rad_per_s == 0.0 {
+        let is_there = self.has_answered() && self.drives.feedback.spindle_at_speed != 0;
+        if is_there || self.drives.setpoint.spindle_rad_per_s == 0.0 {
             self.spin_up = SpinUp::default();
         }
     }
@@ -46,7 +46,7 @@ impl FineLoop {
     /// Whether what the driver says of the spindle is of the speed that it was told last. A spindle has no delay of its own: that
     /// of the slowest joint is its.
     fn has_answered(&self) -> bool {
-        let delay = self.config.attached.delay_periods[..self.joints]
+        let delay = self.config.attached.delay_periods[..self.drives.joints]
             .iter()
             .max()
             .map_or(0, |most| u64::from(*most));
@@ -74,8 +74,8 @@ impl FineLoop {
         if is_slow {
             self.fail(FaultKind::SpindleSlow {
                 within_s: self.config.at_speed_within_s,
-                told_rad_per_s: self.setpoint.spindle_rad_per_s,
-                turns_rad_per_s: self.feedback.spindle_rad_per_s,
+                told_rad_per_s: self.drives.setpoint.spindle_rad_per_s,
+                turns_rad_per_s: self.drives.feedback.spindle_rad_per_s,
             });
         }
         is_slow

@@ -41,12 +41,8 @@ impl FineLoop {
     ///
     /// Fine thread, between ticks; does not allocate. `last` keeps what it counted, and is dropped by the host.
     pub fn succeed(&mut self, last: &mut Self, resets: bool) {
-        std::mem::swap(&mut self.driver, &mut last.driver);
-        (self.setpoint, self.feedback) = (last.setpoint, last.feedback);
-        std::mem::swap(&mut self.sent, &mut last.sent);
-        std::mem::swap(&mut self.measured, &mut last.measured);
-        self.beats_on = last.setpoint.tick > 0;
-        (self.offset, self.axes) = (last.offset, last.axes);
+        self.drives.take_over(&mut last.drives);
+        self.space.take_over(&last.space);
         (self.outputs.bits, self.outputs.spindle_rad_per_s) =
             (last.outputs.bits, last.outputs.spindle_rad_per_s);
         self.outputs.by = last.outputs.by;
@@ -54,25 +50,25 @@ impl FineLoop {
         if self.outputs.ended {
             return;
         }
-        if last.has_ended() && last.attach.is_done() && last.setpoint.enable != 0 {
+        if last.has_ended() && last.attach.is_done() && last.drives.setpoint.enable != 0 {
             (self.state, self.roles) = (last.state, std::mem::take(&mut last.roles));
-            if self.kinematics.is_some() == last.kinematics.is_some() {
+            if self.space.is_like(&last.space) {
                 self.guard.place(last.guard.position());
             } else {
                 // The joints of a gantry were homed each by itself, or are going to be: what is an axis here was none there.
-                self.stand_at(&last.setpoint.position);
+                self.stand_at(&last.drives.setpoint.position);
             }
-            self.attach = Attach::held(last.setpoint.position);
+            self.attach = Attach::held(last.drives.setpoint.position);
             self.end_epoch(Stop::attached());
             self.phase = Phase::Waiting;
         } else {
             // Where the joints stand is asked of the drives once more.
-            if self.kinematics.is_some() == last.kinematics.is_some() {
+            if self.space.is_like(&last.space) {
                 self.guard.place(last.guard.position());
             } else {
-                self.stand_at(&last.feedback.position);
+                self.stand_at(&last.drives.feedback.position);
             }
-            self.attach = Attach::anew(last.feedback.position, resets);
+            self.attach = Attach::anew(last.drives.feedback.position, resets);
             self.state = MachineState::Disabled;
         }
     }
