@@ -467,3 +467,61 @@ pub fn derivatives(c: &[f64; 6], t: f64) -> [f64; 3] {
         6.0 * c[3] + t * (24.0 * c[4] + t * 60.0 * c[5]),
     ]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cursor::Cursor;
+    use rtrb::RingBuffer;
+    use tandem_sdk::{AxisVector, Event, EventKind};
+
+    /// A cursor at rest before segments of these durations, s, at feeds of 1, 2, … mm/s with an event after each; the last one
+    /// but one ends at rest.
+    fn cursor(durations_s: &[f64]) -> Cursor {
+        let (mut input, output) = RingBuffer::new(64);
+        for (number, duration_s) in durations_s.iter().enumerate() {
+            let mut segment = Segment::rest(&AxisVector::ZERO, *duration_s);
+            segment.feed_mm_per_s = number as f64 + 1.0;
+            segment.path[1] = number as f64 + 1.0;
+            segment.flags = if number + 2 == durations_s.len() {
+                SegmentFlags::ENDS_AT_REST
+            } else {
+                SegmentFlags::default()
+            };
+            let start_s = 0.0;
+            input.push(Queued::Segment { start_s, segment }).unwrap();
+            let event = Event::new(EventKind::Mist, 0, 0, 0, 1.0);
+            input.push(Queued::Event(event)).unwrap();
+        }
+        Cursor::new(output, &AxisVector::ZERO)
+    }
+
+    #[test]
+    fn the_pieces_begin_where_the_machine_is_and_end_with_the_rest() {
+        let mut cursor = cursor(&[1.0, 2.0, 4.0, 8.0]);
+        let seen = |cursor: &mut Cursor| -> Vec<[f64; 3]> {
+            let ahead = cursor.ahead();
+            let pieces = ahead.pieces();
+            pieces
+                .map(|piece| [piece.from_s, piece.offset_s, piece.duration_s()])
+                .collect()
+        };
+        let all = [[0.0, 0.0, 1.0], [0.0, 1.0, 2.0], [0.0, 3.0, 4.0]];
+        assert_eq!(seen(&mut cursor), all);
+        cursor.advance(1.5, |_| false);
+        assert_eq!(seen(&mut cursor), [[0.5, 0.0, 1.5], [0.0, 1.5, 4.0]]);
+        let number = cursor.next_number();
+        assert_eq!(cursor.ahead().entries_from(number + 1).count(), 4);
+    }
+
+    #[test]
+    fn what_is_planned_a_while_ahead_is_that_of_the_piece_there() {
+        let mut cursor = cursor(&[1.0, 2.0, 4.0, 8.0]);
+        cursor.advance(0.5, |_| false);
+        for (ahead_s, speed, max_feed) in [(0.25, 1.0, 1.0), (1.0, 2.0, 2.0), (99.0, 3.0, 3.0)] {
+            let planned = cursor.ahead().planned_after(ahead_s);
+            let found = (planned.speed_mm_per_s, planned.max_feed_mm_per_s);
+            assert_eq!(found, (speed, max_feed), "{ahead_s}");
+        }
+    }
+}
