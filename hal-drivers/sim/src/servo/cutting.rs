@@ -12,6 +12,8 @@ const REMEMBERED: usize = 1 << 14;
 #[derive(Clone, Debug)]
 pub struct Cutting {
     options: CuttingOptions,
+    /// N/mm².
+    force_per_area: f64,
     profile: Profile,
     /// Path driven, after each of the last plant steps, mm.
     driven_mm: Vec<f64>,
@@ -27,6 +29,7 @@ impl Cutting {
     pub fn new(options: &CuttingOptions, seed: u64) -> Self {
         Self {
             profile: options.workpiece.drawn(seed),
+            force_per_area: options.force_per_area(),
             options: options.clone(),
             driven_mm: vec![0.0; REMEMBERED],
             at: 0,
@@ -71,7 +74,7 @@ impl Cutting {
         let tooth_steps = TAU / (teeth * spindle_rad_per_s.abs() * step_s);
         let chip_mm = (driven_mm - self.driven_ago_mm(tooth_steps)).max(0.0);
         let ripple = 1.0 + self.options.tooth_ripple * self.tooth_angle_rad.sin();
-        self.options.specific_force_n_per_mm2 * self.depth_mm * chip_mm * ripple
+        self.force_per_area * self.depth_mm * chip_mm * ripple
     }
 
     fn length_mm(&self, [x, y, _]: [f64; 3]) -> f64 {
@@ -126,6 +129,36 @@ mod tests {
         assert!(
             (newtons - 31.415_926_5 / 2.0).abs() < 1e-6,
             "half the feed per tooth, not {newtons} N"
+        );
+    }
+
+    #[test]
+    fn the_force_follows_from_the_shear_of_the_chip() {
+        let text = |angle: &str| {
+            format!(
+                "[merchant]\nshear_stress_n_per_mm2 = 40\nfriction_angle_deg = 35\nrake_angle_deg = 5\n{angle}\n\
+                 [workpiece]\nsteps = [[0.1, 3.0]]"
+            )
+        };
+        // 40 / (sin 25° cos 55°), by hand; 3 mm deep, 150 mm/min, 30 teeth a second.
+        let stated = options(&text("shear_angle_deg = 25"));
+        assert!((stated.force_per_area() - 165.01).abs() < 0.01);
+        let newtons = force(&mut Cutting::new(&stated, 1), 150.0, 900.0);
+        assert!((newtons - 165.01 * 3.0 / 12.0).abs() < 0.01, "{newtons} N");
+        // Left out, it is the angle of least force: 30°.
+        let least = options(&text("")).force_per_area();
+        assert_eq!(
+            least,
+            options(&text("shear_angle_deg = 30")).force_per_area()
+        );
+        for other in ["28", "32"] {
+            let angle = format!("shear_angle_deg = {other}");
+            assert!(options(&text(&angle)).force_per_area() > least);
+        }
+        let never = "shear_angle_deg = 89";
+        assert!(
+            options(&text(never)).check().is_err(),
+            "the chip is never sheared"
         );
     }
 

@@ -135,6 +135,9 @@ pub struct CuttingOptions {
     /// Cutting force per area of the chip, N/mm²: force = this × depth × feed per tooth.
     #[serde(default = "specific_force")]
     pub specific_force_n_per_mm2: f64,
+    /// Where stated, that force follows from the shear in front of the edge instead.
+    #[serde(default)]
+    pub merchant: Option<Merchant>,
     /// Teeth of the cutter.
     #[serde(default = "teeth")]
     pub teeth: u32,
@@ -150,11 +153,69 @@ fn specific_force() -> f64 {
     125.663_706_143_591_73
 }
 
+/// Merchant's model of the chip: it shears in a plane, and slides off the face of the tool.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Merchant {
+    /// Shear stress in the plane, N/mm².
+    pub shear_stress_n_per_mm2: f64,
+    /// Angle of friction between chip and tool, degrees.
+    pub friction_angle_deg: f64,
+    /// Rake of the tool, degrees.
+    #[serde(default)]
+    pub rake_angle_deg: f64,
+    /// Angle of the plane against the motion, degrees; the one that takes the least force where it is left out.
+    #[serde(default)]
+    pub shear_angle_deg: Option<f64>,
+}
+
+impl Merchant {
+    /// Resultant force per area of the chip, N/mm²: `S / (sin φ · cos(φ + β − α))`.
+    pub fn specific_force_n_per_mm2(&self) -> f64 {
+        let leans_deg = self.friction_angle_deg - self.rake_angle_deg;
+        let shear_deg = self.shear_angle_deg.unwrap_or(45.0 - leans_deg / 2.0);
+        let along = (shear_deg + leans_deg).to_radians().cos();
+        self.shear_stress_n_per_mm2 / (shear_deg.to_radians().sin() * along)
+    }
+
+    fn check(&self) -> Result<(), PluginError> {
+        let key = |name: &str| format!("cutting.merchant.{name}");
+        let stress = self.shear_stress_n_per_mm2;
+        within(&key("shear_stress_n_per_mm2"), stress, 0.0, 1e6)?;
+        within(
+            &key("friction_angle_deg"),
+            self.friction_angle_deg,
+            0.0,
+            89.0,
+        )?;
+        within(&key("rake_angle_deg"), self.rake_angle_deg, -45.0, 45.0)?;
+        if let Some(angle) = self.shear_angle_deg {
+            within(&key("shear_angle_deg"), angle, 1.0, 89.0)?;
+        }
+        let force = self.specific_force_n_per_mm2();
+        if (0.0..=1e6).contains(&force) {
+            return Ok(());
+        }
+        Err(refusal(
+            "cutting.merchant",
+            "with these angles no force is large enough to shear the chip",
+        ))
+    }
+}
+
 fn teeth() -> u32 {
     2
 }
 
 impl CuttingOptions {
+    /// Cutting force per area of the chip, N/mm².
+    pub(crate) fn force_per_area(&self) -> f64 {
+        self.merchant.as_ref().map_or(
+            self.specific_force_n_per_mm2,
+            Merchant::specific_force_n_per_mm2,
+        )
+    }
+
     pub(crate) fn check(&self) -> Result<(), PluginError> {
         within(
             "cutting.specific_force_n_per_mm2",
@@ -162,6 +223,9 @@ impl CuttingOptions {
             0.0,
             1e6,
         )?;
+        if let Some(merchant) = &self.merchant {
+            merchant.check()?;
+        }
         within("cutting.teeth", f64::from(self.teeth), 1.0, 100.0)?;
         within("cutting.tooth_ripple", self.tooth_ripple, 0.0, 1.0)?;
         let finite = self.workpiece.origin_mm.iter().all(|v| v.is_finite())
