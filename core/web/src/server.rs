@@ -24,8 +24,9 @@ use crate::judge::{Admits, Doorkeeper, PROTOCOL};
 const MAX_PAGES: usize = 12;
 /// Longest message of a page, bytes: a program may be in it.
 const MAX_MESSAGE_BYTES: usize = 8 << 20;
-/// Bytes that the system keeps for a page: telemetry that waits longer is old.
-const SEND_BUFFER_BYTES: usize = 32 * 1024;
+/// Bytes that the system keeps for a page: telemetry that waits longer is old. A packed answer with a part of a path fits: where it
+/// does not, its end waits until the browser has said that the beginning is there, which it puts off for 40 ms.
+const SEND_BUFFER_BYTES: usize = 64 * 1024;
 /// Stack of the thread, bytes: it is locked into memory with the rest.
 const STACK_BYTES: usize = 512 * 1024;
 
