@@ -202,6 +202,15 @@ impl Desk {
                     self.path().show(from, driven_from)
                 }))
             }
+            "text" => {
+                let number = |key: &str, usual| asked.whole_if_any(key).unwrap_or(usual);
+                let (first, count) = (number("from", 1), number("lines", u64::MAX));
+                let loaded = inner.loaded.as_ref();
+                Ok(Acted::Done(loaded.map_or_else(
+                    || json!({ "program": null, "lines": [], "count": 0 }),
+                    |program| program.show(first, count),
+                )))
+            }
             "scope" => self.scope().watch(from.client, asked).map(Acted::Done),
             "capture" => self.scope().arm(from.client, asked).map(Acted::Done),
             "captured" => {

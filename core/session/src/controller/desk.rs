@@ -155,16 +155,72 @@ pub struct Loaded {
     pub text: Arc<[u8]>,
     /// SHA-256 of the text, as `sha256sum` prints it.
     pub hash: String,
+    /// Where every [`LINES_PER_MARK`]th line begins, from the first on, and the number of lines.
+    marks: Arc<[usize]>,
+    lines: usize,
 }
 
+/// Lines from one place that is kept of a text to the next: what is looked through to find one.
+const LINES_PER_MARK: usize = 256;
+/// Lines of one answer at most, and characters of each: it fits what may wait for a client.
+const MAX_LINES: usize = 200;
+const MAX_LINE_CHARACTERS: usize = 160;
+
 impl Loaded {
-    /// A program, and its hash.
+    /// A program, and its hash. Allocates.
     pub fn new(name: String, text: Arc<[u8]>) -> Self {
         let mut hash = String::new();
         for byte in Sha256::digest(&text) {
             let _ = write!(hash, "{byte:02x}");
         }
-        Self { name, text, hash }
+        let starts = text
+            .split_inclusive(|byte| *byte == b'\n')
+            .scan(0, |at, line| {
+                let start = *at;
+                *at += line.len();
+                Some(start)
+            });
+        let (mut marks, mut lines) = (vec![], 0);
+        for (number, start) in starts.enumerate() {
+            if number.is_multiple_of(LINES_PER_MARK) {
+                marks.push(start);
+            }
+            lines = number + 1;
+        }
+        Self {
+            name,
+            text,
+            hash,
+            marks: marks.into(),
+            lines,
+        }
+    }
+
+    /// `count` lines from line `from` (1 is the first) on, as many of them as one answer holds. Allocates.
+    pub fn show(&self, from: u64, count: u64) -> Value {
+        let first = usize::try_from(from).unwrap_or(usize::MAX).max(1) - 1;
+        let start = self.marks.get(first / LINES_PER_MARK).copied();
+        let text = start.map_or(&[][..], |start| &self.text[start..]);
+        let lines: Vec<String> = text
+            .split(|byte| *byte == b'\n')
+            .skip(first % LINES_PER_MARK)
+            .take(self.lines.saturating_sub(first))
+            .take(usize::try_from(count).unwrap_or(MAX_LINES).min(MAX_LINES))
+            .map(|line| {
+                let line = line.strip_suffix(b"\r").unwrap_or(line);
+                // No character has more than four bytes.
+                let part = &line[..line.len().min(4 * MAX_LINE_CHARACTERS)];
+                let shown = String::from_utf8_lossy(part);
+                shown.chars().take(MAX_LINE_CHARACTERS).collect()
+            })
+            .collect();
+        json!({
+            "program": self.name,
+            "program_hash": self.hash,
+            "from": first + 1,
+            "lines": lines,
+            "count": self.lines,
+        })
     }
 }
 

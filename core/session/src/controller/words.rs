@@ -96,7 +96,7 @@ use Kind::{Axes, Number, OneOf, Switch, Text, Texts, Whole};
 
 /// All requests. A jog that is let go has a row of its own, `jog-stop`.
 #[rustfmt::skip]
-pub const WORDS: [Word; 40] = [
+pub const WORDS: [Word; 41] = [
     //                        E D N R J M P H S F
     word("status",           "++++++++++", FREE, &[], "everything that is shown of the machine"),
     word("subscribe",        "++++++++++", FREE, &[need("rate_hz", Number), may("fields", Texts), may("changes", Switch)],
@@ -108,6 +108,8 @@ pub const WORDS: [Word; 40] = [
     word("tables",           "++++++++++", FREE, &[], "work offsets and tools"),
     word("path",             "++++++++++", FREE, &[may("from", Whole), may("driven_from", Whole), may("packed", Switch)],
         "the programmed path in pieces, and where the machine was; [below](#path)"),
+    word("text",             "++++++++++", FREE, &[may("from", Whole), may("lines", Whole)],
+        "lines of the program that is loaded, at most 200 from line `from` on (1 without), and how many there are"),
     word("policy-parameters", "++++++++++", FREE, &[], "parameters of the policy script: those that are stated with their values, and all with their bounds and defaults"),
     word("scope",            "++++++++++", FREE, &[need("signals", Texts), may("every", Whole)],
         "`scope` events with these signals of every fine period, or of each `every`th; none end it; [below](#scope)"),

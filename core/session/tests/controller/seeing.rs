@@ -289,6 +289,63 @@ fn a_program_is_brought_whole_or_not_at_all() {
     assert_eq!(left, ["part.ngc"]);
 }
 
+/// A page that has never had the file shows the lines that move: any part of a long program is told, and never more than an answer
+/// holds.
+#[test]
+fn the_lines_of_the_program_that_is_loaded_are_told() {
+    let line = |number: u64| format!("G1 X{}", number % 7);
+    let long = format!("({})", "ä".repeat(300));
+    let text: String = (1..=1000)
+        .map(|number| match number {
+            600 => long.clone() + "\r\n",
+            1000 => "M2".to_string(),
+            _ => line(number) + " F600\n",
+        })
+        .collect();
+    let mut says = Says::new();
+    let none = says.ask(1000, "text", json!({}));
+    says.ask(10, "load", json!({ "text": text, "name": "long.ngc" }));
+    let asked = [
+        json!({}),
+        json!({ "from": 255, "lines": 3 }),
+        json!({ "from": 599, "lines": 2 }),
+        json!({ "from": 999, "lines": 9 }),
+        json!({ "from": 1001 }),
+        json!({ "from": u64::MAX, "lines": u64::MAX }),
+    ]
+    .map(|with| says.ask(100, "text", with));
+    let told = Told::by(
+        &machine("mill-3axis.toml"),
+        says,
+        |_| (),
+        Box::new(NoKeeper),
+    );
+    let nothing = told.ok(none);
+    assert_eq!(
+        (&nothing["program"], &nothing["lines"]),
+        (&Value::Null, &json!([]))
+    );
+    let [first, middle, wide, last, beyond, far] = asked.map(|id| told.ok(id));
+    assert_eq!(
+        (&first["program"], &first["count"]),
+        (&json!("long.ngc"), &json!(1000))
+    );
+    assert_eq!(first["lines"].as_array().map(Vec::len), Some(200));
+    assert_eq!(first["lines"][0], line(1) + " F600");
+    let expected: Vec<_> = (255..258).map(|number| line(number) + " F600").collect();
+    assert_eq!(
+        (&middle["from"], &middle["lines"]),
+        (&json!(255), &json!(expected))
+    );
+    let shown = wide["lines"][1].as_str().unwrap();
+    assert_eq!(shown.chars().count(), 160);
+    assert!(shown.starts_with("(ä"));
+    assert_eq!(last["lines"], json!([line(999) + " F600", "M2"]));
+    for empty in [beyond, far] {
+        assert_eq!(empty["lines"], json!([]));
+    }
+}
+
 #[test]
 fn keys_of_axes_that_the_machine_lacks_are_refused() {
     let mut says = Says::new();
