@@ -34,9 +34,8 @@ export function controls() {
   at("next-action").addEventListener("click", act);
   // One button begins and goes on: what it would do stands on it.
   at("start").addEventListener("click", () => {
-    const request = startRequest();
-    const why = machine.refusal(request);
-    if (why) say(why); else machine.ask(request);
+    const why = startRefusal();
+    if (why) say(why); else machine.ask(startRequest());
   });
   for (const request of ["hold", "abort"]) bind(at(request), request, () => machine.ask(request));
   at("stop").addEventListener("click", () => machine.ask("emergency-stop"));
@@ -51,6 +50,12 @@ export function controls() {
 
 function startRequest() {
   return machine.status && machine.status.state === "held" ? "resume" : "start";
+}
+
+// Why the button does nothing now; null where it does.
+function startRefusal() {
+  const isMissing = startRequest() === "start" && machine.status && !machine.status.program;
+  return machine.refusal(startRequest()) || (isMissing ? "No program is loaded: choose one under Programs." : null);
 }
 
 async function act() {
@@ -105,21 +110,24 @@ function draw() {
   text("state", word);
   text("state-mark", mark);
   const strangerWords = "This address has no valid token: open the one that tandem serve has printed last.";
-  const [words, label, request] = status ? nextStep(status, machine.described)
+  const [words, label, request] = status ? nextStep(status, machine.described, machine.hasLease || !machine.mayAsk("lease"))
     : [stranger ? strangerWords : "The controller does not answer. Trying again; nothing is sent meanwhile."];
   text("next", words || "");
   step = request && machine.mayAsk(request) ? request : null;
   at("next-action").hidden = !step;
   if (step) text("next-action", machine.hasLease ? label : `Take control · ${label}`);
   const mayControl = machine.mayAsk("lease");
+  // What comes first for whoever opens the page, where no other button offers it.
+  at("lease").classList.toggle("primary", Boolean(status) && !status.job && mayControl && !machine.hasLease && !step);
   at("lease").setAttribute("aria-disabled", String(!mayControl));
   const alarms = status ? status.alarms.length : 0;
   at("alarms").classList.toggle("none", alarms === 0);
   text("alarms", alarms === 1 ? "1 alarm" : `${alarms} alarms`);
   text("lease", !mayControl ? "Looks on" : machine.hasLease ? "In control" : at("lease").dataset.how === "take-over" ? "Take it over" : "Take control");
   at("lease").title = !mayControl ? machine.refusal("lease") : machine.hasLease ? "Press to give control back" : "One page controls the machine, all others look";
-  at("start").setAttribute("aria-disabled", machine.refusal(startRequest()) ? "true" : "false");
-  at("start").title = machine.refusal(startRequest()) || "";
+  const idle = startRefusal();
+  at("start").setAttribute("aria-disabled", idle ? "true" : "false");
+  at("start").title = idle || "";
   text("start", startRequest() === "resume" ? "Resume" : "Start");
   const why = machine.refusal("feed-override");
   for (const [id, ratio, shown] of [["feed-override", "feed_override", "feed-ratio"], ["rapid-override", "rapid_override", "rapid-ratio"]]) {

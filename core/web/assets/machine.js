@@ -65,10 +65,11 @@ export function connect() {
   link.on("greeting", async ({ role }) => {
     machine.role = ROLES.includes(role) ? role : "set-up";
     try {
-      machine.described = await link.ask("machine");
-      machine.tell("described", machine.described);
-      show(await link.ask("status"));
-      await link.ask("subscribe", { rate_hz: STATUS_RATE_HZ });
+      // Asked together: what is true stands here after one answer's way.
+      const [described, status] = await Promise.all([link.ask("machine"), link.ask("status"), link.ask("subscribe", { rate_hz: STATUS_RATE_HZ })]);
+      machine.described = described;
+      machine.tell("described", described);
+      if (!machine.status) show(status);
     } catch (error) { say(error.message); }
   });
   link.on("status", ({ status, lost }) => { show(status); if (lost) machine.lost = (machine.lost || 0) + lost; });

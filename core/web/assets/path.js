@@ -3,8 +3,8 @@
 import { machine, onFrame } from "./machine.js";
 import { text } from "./words.js";
 
-const COLOURS = ["faint", "line", "grid", "soft", "good"];
-const [FEED, RAPID, GRID, BOX, DRIVEN] = [0, 1, 2, 3, 4];
+const COLOURS = ["faint", "rapid", "grid", "soft", "good", "line"];
+const [FEED, RAPID, GRID, BOX, DRIVEN, EDGE] = [0, 1, 2, 3, 4, 5];
 const NO_LINE_HERE = -1;
 // What a packed path says of each point.
 const KINDS = [FEED, RAPID, NO_LINE_HERE];
@@ -84,7 +84,7 @@ function begin(next) {
   for (let y = Math.ceil(low[1] / step) * step; y <= high[1]; y += step) add([low[0], y, low[2]], [high[0], y, low[2]], GRID);
   const corner = (bits) => [0, 1, 2].map((axis) => (bits >> axis & 1 ? high : low)[axis]);
   for (let bits = 0; bits < 8; bits++) {
-    for (const axis of [1, 2, 4]) if (!(bits & axis)) add(corner(bits), corner(bits | axis), bits & 4 || axis === 4 ? RAPID : BOX);
+    for (const axis of [1, 2, 4]) if (!(bits & axis)) add(corner(bits), corner(bits | axis), bits & 4 || axis === 4 ? EDGE : BOX);
   }
   groundPoints = ground.length / 4;
   send({ clear: ["programmed", "driven"], add: { programmed: new Float32Array(ground) } });

@@ -35,7 +35,7 @@ function build({ axes }) {
   limits.replaceChildren(...heads, ...axes.flatMap((axis) => {
     const all = ["velocity", "acceleration", "jerk"].map(() => {
       const gauge = { bar: element("u"), peak: element("em", { hidden: "" }), label: element("span", {}, "–"), most: 0 };
-      gauge.root = element("div", { class: "gauge", style: `--key: var(--${axis.axis}, var(--accent))` }, gauge.bar, gauge.peak, gauge.label);
+      gauge.root = element("div", { class: "gauge", style: `--key: var(--${axis.axis}, var(--accent))` }, element("div", {}, gauge.bar, gauge.peak), gauge.label);
       return gauge;
     });
     gauges.set(axis.axis, all);
@@ -67,6 +67,8 @@ function draw() {
   text("modal", modal(status.modal));
   text("io", words(status));
   if (!machine.scoped) speeds(status, described);
+  // The scope tells nothing of a machine at rest.
+  if (!status.job) for (const axis of described.axes) for (const order of [0, 1, 2]) showGauge(axis, order, 0);
 }
 
 function modal(codes) {

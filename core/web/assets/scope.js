@@ -146,7 +146,7 @@ function build() {
   plot = timePlot(place, {
     label: `Scope: ${what[1]}`, times: [0, SPAN_S], curves: all.map((curve, index) => ({ ...curve, values: values[index] })),
     hasTime: true, fromZero: what[0] === "feed", least: what[0] === "following" ? 1e-3 : what[0] === SIGNALS ? 1e-6 : 1,
-    hooks: { draw: [drawTrigger] },
+    valueAxis: { size: 52 }, hooks: { draw: [drawTrigger] },
   });
 }
 

@@ -39,9 +39,9 @@ export function offsetsPanel() {
 
 export function toolsPanel() {
   const table = element("table");
-  const number = element("input", { type: "number", min: "1", step: "1", "aria-label": "Tool number", placeholder: "T" });
-  const length = element("input", { type: "number", step: "any", "aria-label": "Length offset in mm", placeholder: "length mm" });
-  const diameter = element("input", { type: "number", step: "any", "aria-label": "Diameter in mm", placeholder: "⌀ mm" });
+  const number = element("input", { type: "number", min: "1", step: "1", "aria-label": "Tool number" });
+  const length = element("input", { type: "number", step: "any", "aria-label": "Length offset in mm" });
+  const diameter = element("input", { type: "number", step: "any", "aria-label": "Diameter in mm" });
   const fill = ({ tools }) => {
     const inSpindle = machine.status ? machine.status.tool : 0;
     const row = (tool) => {
@@ -65,7 +65,7 @@ export function toolsPanel() {
   machine.on("described", () => read(fill));
   machine.on("status", (status) => { if (status && status.tool !== tool) { tool = status.tool; read(fill); } });
   return element("div", {}, element("div", { class: "wide" }, table), element("h2", {}, "A tool"),
-    element("div", { class: "row" }, number, length, diameter, set));
+    element("div", { class: "fields" }, ...[["Number", number], ["Length mm", length], ["Diameter mm", diameter]].map(([name, input]) => element("label", {}, name, input))), set);
 }
 
 export function historyPanel() {
@@ -97,7 +97,9 @@ function alarmRow({ alarm, text, raised_unix_ms: raised, acknowledged_unix_ms: s
 
 function job({ name, outcome, time_s, stops }) {
   const time = Number.isFinite(time_s) ? `${time_s.toFixed(1)} s` : "";
-  const words = outcome === "done" ? "" : outcome || "is driven";
-  return element("li", { class: "row" }, element("span", { class: "grow name" }, name), element("small", { class: ["fault", "emergency-stop", "lost"].includes(outcome) ? "bad" : null }, words),
-    element("small", {}, stops ? `${stops} stops` : ""), element("small", { style: "min-width: 58px; text-align: right" }, time));
+  const words = outcome === "done" ? "" : outcome ? outcome.replace("-", " ") : "is driven";
+  const facts = [words, stops === 1 ? "1 stop" : stops ? `${stops} stops` : ""].filter(Boolean).join(", ");
+  const row = element("li", { class: "job" }, element("span", { class: "name" }, name), element("small", {}, time));
+  if (facts) row.append(element("small", { class: ["fault", "emergency-stop", "lost"].includes(outcome) ? "bad" : null }, facts));
+  return row;
 }

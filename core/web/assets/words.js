@@ -14,7 +14,7 @@ export const STATES = {
 };
 
 // What the operator can do next: words, and the request behind the button.
-export function nextStep(status, described) {
+export function nextStep(status, described, hasLease) {
   const { state } = status;
   if (status.enabling) return ["The drives are being enabled: " + status.enabling];
   switch (state) {
@@ -32,6 +32,7 @@ export function nextStep(status, described) {
       if (status.waits_on_line !== null) return [`The program waits at line ${status.waits_on_line}.`, "Resume", "resume"];
       return [status.held_by ? `Held by ${status.held_by}: release it, then resume.` : "Feed hold: the machine stands on the path.", "Resume", "resume"];
     case "running":
+      if (status.feed_override === 0) return ["The feed override is at 0 %: nothing moves."];
       return [status.waits_for ? "Waits for " + status.waits_for : status.job === "home" ? "The axes look for their switches." : `${status.program || "Program"}, line ${status.line}`];
     case "stopping":
       return ["The machine comes to rest."];
@@ -41,7 +42,7 @@ export function nextStep(status, described) {
       return ["Lines by hand are driven as they come."];
     case "ready":
       if (status.program) return [`${status.program} is loaded.`, "Start", "start"];
-      return [described ? "Choose a program, jog, or type a line." : ""];
+      return [!described ? "" : hasLease ? "Choose a program, jog, or type a line." : "This page looks on. Take control to choose a program, jog, or type a line."];
     default:
       return [""];
   }
