@@ -1,7 +1,7 @@
 // A controller with its page, a browser that shows it, and an observer at the controller's socket that is no browser.
 import { spawn } from "node:child_process";
 import { createConnection } from "node:net";
-import { mkdtempSync, rmSync } from "node:fs";
+import { mkdtempSync, readFileSync, rmSync } from "node:fs";
 import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -17,14 +17,17 @@ export function check(holds, words) {
   if (!holds) throw new Error(words);
 }
 
+// Nothing has gone wrong in a page.
+export const clean = (page) => check(page.errors.length === 0, page.errors.join("\n"));
+
 // Waits for what has to come at last; how long it takes decides nothing.
-export async function until(words, look, ms = 20000) {
+export async function until(words, look, ms = 20000, every = 10) {
   const end = Date.now() + ms;
   for (;;) {
     const found = await look();
     if (found) return found;
     if (Date.now() > end) throw new Error(`this did not come: ${words}`);
-    await sleep(10);
+    await sleep(every);
   }
 }
 
@@ -34,15 +37,17 @@ export async function serve(machine, more = []) {
   const socket = join(folder, "socket");
   const child = spawn(TANDEM, ["serve", "--machine", machine, "--no-state", "--listen", socket, "--http", "127.0.0.1:0", "--set", "loops.max_missed_periods=1000", "--set", "loops.max_missed_share=1", ...more], { stdio: ["ignore", "ignore", "pipe"] });
   let said = "";
-  const link = await new Promise((found, refuse) => {
-    child.stderr.on("data", (data) => { said += data; const match = said.match(/http:\/\/\S+/); if (match) found(match[0]); });
+  // One address, and another one for each further token.
+  const addresses = 1 + more.filter((word) => word.endsWith("-token-file")).length;
+  const links = await new Promise((found, refuse) => {
+    child.stderr.on("data", (data) => { said += data; const all = said.match(/http:\/\/\S+(?=\s)/g) || []; if (all.length >= addresses) found(all); });
     child.on("exit", () => refuse(new Error(said)));
   });
   const end = async () => {
     if (child.exitCode === null) { child.kill("SIGTERM"); await new Promise((over) => child.on("exit", over)); }
     rmSync(folder, { recursive: true, force: true });
   };
-  return { link, socket, folder, end, child };
+  return { link: links[0], links, socket, folder, end, child };
 }
 
 // A client of the controller's socket.
@@ -72,19 +77,48 @@ export async function observer(path) {
     waiting.set(id, [answer, refuse]);
     socket.write(JSON.stringify({ id, request, ...keys }) + "\n");
   });
-  await greeting;
-  return { ask, events, end: () => socket.destroy() };
+  const { client } = await greeting;
+  return { ask, client, events, end: () => socket.destroy() };
 }
 
-export function browse() {
-  // Drawn by the processor, as on a computer without a graphics unit.
-  const args = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
-  return chromium.launch({ executablePath: CHROMIUM, args });
+let shared = null;
+
+// The browser of all cases: each has contexts of its own, which know nothing of each other.
+export async function browse() {
+  if (shared && shared.isConnected()) return shared;
+  // Drawn by the processor, as on a computer without a graphics unit; one case compares with WebGL. A name that is bound to this computer
+  // is a stranger's.
+  const args = ["--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader", `--host-resolver-rules=MAP ${STRANGER} 127.0.0.1`];
+  shared = await chromium.launch({ executablePath: CHROMIUM, args });
+  return shared;
+}
+
+export const STRANGER = "evil.example";
+
+// Runs a case on a controller of its own, in the browser that all share.
+export async function inside(machine, act, more = ["--programs", "examples/programs"]) {
+  const [controller, browser] = await Promise.all([serve(machine, more), browse()]);
+  try {
+    const watch = await observer(controller.socket);
+    await act({ controller, browser, watch });
+    watch.end();
+  } finally {
+    await Promise.all(browser.contexts().map((context) => context.close()));
+    await controller.end();
+  }
+}
+
+// Waits until as many fine periods have passed for the machine.
+export async function passes(watch, periods) {
+  const from = (await watch.ask("status")).tick;
+  await until("time passes for the machine", async () => (await watch.ask("status")).tick > from + periods, 60000);
 }
 
 // A page of the controller, once it shows the machine; `before` runs in it before anything else.
 export async function open(browser, link, { before, ...options } = {}) {
   const context = await browser.newContext({ viewport: { width: 1280, height: 800 }, ...options });
+  // A busy computer takes its time.
+  context.setDefaultTimeout(120000);
   if (before) await context.addInitScript(before);
   const page = await context.newPage();
   const errors = [];
@@ -104,22 +138,53 @@ export async function take(page) {
   await page.waitForFunction(() => window.tandem.hasLease);
 }
 
-// The largest of some echo times of the page, ms.
-export function echo(page) {
-  return page.evaluate(async () => {
-    let most = 0;
-    for (let i = 0; i < 30; i++) {
+// Some echo times of the page, ms.
+export function echoes(page, count) {
+  return page.evaluate(async (count) => {
+    const all = [];
+    for (let i = 0; i < count; i++) {
       const start = performance.now();
       await window.tandem.link.ask("status");
-      most = Math.max(most, performance.now() - start);
+      all.push(performance.now() - start);
     }
-    return most;
-  });
+    return all;
+  }, count);
+}
+
+export function median(values) {
+  return [...values].sort((a, b) => a - b)[Math.floor(values.length / 2)];
+}
+
+// The processor time of every task of the pages' main threads while something happens, ms: what else a computer does adds nothing
+// to it, as it does to the time on the clock.
+export async function tasks(browser, act) {
+  const session = await browser.newBrowserCDPSession(), events = [];
+  session.on("Tracing.dataCollected", ({ value }) => events.push(...value));
+  await session.send("Tracing.start", { traceConfig: { includedCategories: ["toplevel"] }, transferMode: "ReportEvents" });
+  await act();
+  const complete = new Promise((done) => session.on("Tracing.tracingComplete", done));
+  await session.send("Tracing.end");
+  await complete;
+  await session.detach();
+  const main = new Set(events.filter(({ name, args }) => name === "thread_name" && args.name === "CrRendererMain").map(({ tid }) => tid));
+  const all = events.filter(({ name, tid, tdur }) => name === "ThreadControllerImpl::RunTask" && main.has(tid) && tdur !== undefined);
+  check(all.length > 0, "no task of a page was seen");
+  return all.map(({ tdur }) => tdur / 1000);
+}
+
+// Processor time that the browser and a controller have taken, s.
+export async function used(browser, controller) {
+  const session = await browser.newBrowserCDPSession();
+  const { processInfo } = await session.send("SystemInfo.getProcessInfo");
+  await session.detach();
+  const [, user, system] = readFileSync(`/proc/${controller.child.pid}/stat`, "utf8").match(/\) (?:\S+ ){11}(\d+) (\d+)/);
+  return { browser: processInfo.reduce((sum, { cpuTime }) => sum + cpuTime, 0), controller: (Number(user) + Number(system)) / 100 };
 }
 
 // The processes that draw pages and run their scripts: one of the page, and one that the browser keeps in store.
 export async function renderersOf(browser) {
   const session = await browser.newBrowserCDPSession();
   const { processInfo } = await session.send("SystemInfo.getProcessInfo");
+  await session.detach();
   return processInfo.filter((process) => process.type === "renderer").map((process) => process.id);
 }
