@@ -17,7 +17,7 @@ export function jogPanel() {
   const pad = element("div", { class: "pad", tabindex: "0", "aria-label": "Jog: arrow keys move X and Y, page up and page down Z" });
   const steps = element("div", { class: "steps", role: "group", "aria-label": "Step" });
   const select = element("select", { "aria-label": "Jog feed", onchange: () => { feed = Number(select.value); } });
-  const home = element("div", { class: "pad" });
+  const home = element("div", { class: "pad homes" });
   const root = element("div", {},
     element("div", { class: "row" }, element("h2", { class: "grow" }, "Feed"), select),
     element("h2", {}, "Step in mm or deg; “held” moves while the key is held"), steps, pad,

@@ -7,7 +7,7 @@ export function machinePanel() {
   const bus = element("p", { id: "bus", hidden: "" });
   const states = new Map();
   machine.on("described", ({ axes, plugins: all, inputs, outputs }) => {
-    const shown = (value) => (Number.isFinite(value) ? String(Math.round(value)) : "–");
+    const shown = (value) => (Number.isFinite(value) ? String(Math.round(value)).replace("-", "−") : "–");
     const head = (...names) => element("thead", {}, element("tr", {}, ...names.map((name) => element("th", {}, name))));
     limits.replaceChildren(head("", "travel", "/min", "/s²", "/s³"), element("tbody", {}, ...axes.map((axis) => element("tr", {},
       ...[`${axis.axis.toUpperCase()} ${axis.unit}`, `${shown(axis.min)}…${shown(axis.max)}`, shown(axis.max_feed_per_min), shown(axis.max_acceleration_per_s2), shown(axis.max_jerk_per_s3)]

@@ -26,7 +26,7 @@ export function nextStep(status, described, hasLease) {
       return ["The drives do not hold. Enable them when nobody is in the machine.", "Enable drives", "enable"];
     case "homing-needed": {
       const axes = status.not_homed.join(", ").toUpperCase();
-      return [axes ? `It is not known where ${axes} stands.` : "The machine is to be homed first.", "Home all", "home"];
+      return [axes ? `It is not known where ${axes} ${status.not_homed.length > 1 ? "stand" : "stands"}.` : "The machine is to be homed first.", "Home all", "home"];
     }
     case "held":
       if (status.waits_on_line !== null) return [`The program waits at line ${status.waits_on_line}.`, "Resume", "resume"];
