@@ -238,4 +238,31 @@ mod tests {
             io::ErrorKind::InvalidInput
         );
     }
+
+    /// The scripts of a report share one space of names: of two that are the same the later one is everybody's.
+    #[test]
+    fn no_two_parts_of_the_page_have_a_name_in_common() {
+        let shared = SHARED.map(tandem_view::text);
+        let parts = shared.iter().map(String::as_str).chain(SCRIPTS);
+        let mut known = std::collections::BTreeSet::new();
+        for line in parts.flat_map(str::lines) {
+            let line = line.strip_prefix("async ").unwrap_or(line);
+            let Some((kind, rest)) = line.split_once(' ') else {
+                continue;
+            };
+            if !["function", "const", "let", "class"].contains(&kind) {
+                continue;
+            }
+            let is_in_name = |c: char| c.is_alphanumeric() || c == '_';
+            let name = rest
+                .split(|c: char| !is_in_name(c))
+                .next()
+                .unwrap_or_default();
+            assert!(
+                name.is_empty() || known.insert(name),
+                "{name} is there twice"
+            );
+        }
+        assert!(known.contains("Camera") && known.contains("Curve"));
+    }
 }

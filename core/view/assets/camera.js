@@ -41,7 +41,7 @@ class Camera {
   }
 
   widen(ends, point) {
-    const u = dot(this.right, point), v = dot(this.up, point);
+    const u = inner(this.right, point), v = inner(this.up, point);
     if (u < ends.u0) ends.u0 = u;
     if (u > ends.u1) ends.u1 = u;
     if (v < ends.v0) ends.v0 = v;
@@ -52,14 +52,14 @@ class Camera {
   frame({ u0, u1, v0, v1 }, about) {
     if (!(this.width > 0 && this.height > 0 && u0 <= u1)) return;
     this.scale = Math.min((this.width - 80) / Math.max(u1 - u0, 1e-3), (this.height - 104) / Math.max(v1 - v0, 1e-3));
-    const du = (u0 + u1) / 2 - dot(this.right, about), dv = (v0 + v1) / 2 - dot(this.up, about);
+    const du = (u0 + u1) / 2 - inner(this.right, about), dv = (v0 + v1) / 2 - inner(this.up, about);
     this.centre = [0, 1, 2].map((axis) => about[axis] + du * this.right[axis] + dv * this.up[axis]);
   }
 
   // A point of space on the screen, px.
   screen([x, y, z]) {
     const point = [x - this.centre[0], y - this.centre[1], z - this.centre[2]];
-    return [this.width / 2 + dot(this.right, point) * this.scale, this.height / 2 + BELOW_MIDDLE - dot(this.up, point) * this.scale];
+    return [this.width / 2 + inner(this.right, point) * this.scale, this.height / 2 + BELOW_MIDDLE - inner(this.up, point) * this.scale];
   }
 
   move(dx, dy) {
@@ -123,6 +123,6 @@ class Camera {
   }
 }
 
-function dot(a, b) {
+function inner(a, b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
