@@ -29,7 +29,7 @@ export async function pictures(folder = "docs/pictures", all = false) {
     await page.click("#tab-programs");
     await page.click("text=serpentine.ngc");
     await page.waitForFunction(() => window.tandem.status.program === "serpentine.ngc");
-    await page.locator("#feed-override").fill("60");
+    await page.locator("#feed-override").fill("30");
     await page.click("#tab-jog");
     await page.click("#start");
     await until("it is half done", async () => (await watch.ask("status")).progress > (all ? 0.3 : 0.6));
