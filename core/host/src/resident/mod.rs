@@ -379,7 +379,8 @@ impl<'r> Resident<'r> {
     }
 
     /// Enables the drives where they stand; with `resets` their faults are reset first, and drives that were lost are claimed
-    /// anew. The outcome's fault is that of a drive that does not hold. Host.
+    /// anew. The outcome's fault is that of a drive that does not hold, or an emergency stop that is in force: whoever takes that
+    /// back does so before ([`Controls::emergency_stop`]), and knows of which one he speaks. Host.
     ///
     /// # Errors
     /// The computer refuses, or plugins do.
@@ -397,7 +398,6 @@ impl<'r> Resident<'r> {
         }
         let job = self.source("enabling", Box::new(Nothing), switches)?;
         self.controls.let_go.store(false, Relaxed);
-        self.controls.emergency_stop.store(false, Relaxed);
         let outcome = self.drive_with(job, resets, observer)?;
         self.enabled = outcome.fault.is_none() && !outcome.aborted;
         Ok(outcome)

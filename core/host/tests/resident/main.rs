@@ -164,6 +164,16 @@ fn after_an_abort_a_fault_and_letting_go_the_next_job_begins_where_the_machine_s
     let outcome = driven(&mut resident, PART, &mut kept);
     assert!(outcome.summary.fault.is_some() && !resident.is_enabled());
     assert_eq!(outcome.position, kept.samples.last().unwrap().command);
+    assert!(
+        resident
+            .enable(true, &mut ())
+            .unwrap()
+            .summary
+            .fault
+            .is_some(),
+        "the stop is in force until it is taken back"
+    );
+    controls.emergency_stop.store(false, Relaxed);
     assert_eq!(resident.enable(true, &mut ()).unwrap().summary.fault, None);
     assert!(resident.is_enabled());
     let off_mm = resident.machine().start - outcome.position;
@@ -239,6 +249,7 @@ fn on_the_wall_clock_one_thread_lives_through_all_jobs() {
         ..Kept::default()
     };
     assert!(driven(&mut resident, text, &mut kept).fault.is_some());
+    resident.controls().emergency_stop.store(false, Relaxed);
     assert_eq!(resident.enable(true, &mut ()).unwrap().summary.fault, None);
     assert_eq!(
         driven(&mut resident, text, &mut Kept::default())

@@ -229,6 +229,7 @@ impl Desk {
             "resume" => give(Command::Resume),
             "emergency-stop" => {
                 inner.stops += 1;
+                inner.emergency_stops += 1;
                 give(Command::EmergencyStop)
             }
             "abort" => {
@@ -309,10 +310,10 @@ impl Desk {
                     axis: axis.transpose()?,
                 }))
             }
-            "reset" => Ok(Acted::Ordered(Order::Enable { from, resets: true })),
-            "enable" => Ok(Acted::Ordered(Order::Enable {
+            "reset" | "enable" => Ok(Acted::Ordered(Order::Enable {
                 from,
-                resets: false,
+                resets: name == "reset",
+                emergency_stops: inner.emergency_stops,
             })),
             "disable" => Ok(Acted::Ordered(Order::Disable { from })),
             other => Err(format!("{other} is not done here")),

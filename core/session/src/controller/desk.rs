@@ -87,9 +87,11 @@ pub enum Order {
         from: From,
         axis: Option<usize>,
     },
+    /// Not where an emergency stop has been asked for since, of which there had been so many.
     Enable {
         from: From,
         resets: bool,
+        emergency_stops: u64,
     },
     Disable {
         from: From,
@@ -256,6 +258,8 @@ pub struct Inner {
     pub aborting: bool,
     /// So many stops were asked for that end what is driven.
     pub stops: u64,
+    /// So many of them are emergency stops.
+    pub emergency_stops: u64,
     pub books: Books,
     pub history: History,
     /// Parameters of the policy script, as the next job has them.
@@ -324,6 +328,7 @@ impl Desk {
             fault: None,
             aborting: false,
             stops: 0,
+            emergency_stops: 0,
             books: Books::Closed,
             history: History::of(&keeper.remembered()),
             policy_parameters: BTreeMap::new(),
@@ -542,10 +547,34 @@ impl Desk {
         }
         inner.mode = mode;
         drop(inner);
+        self.begun();
+        true
+    }
+
+    /// The drives are on their way to holding, whatever fault there was; `false` where an emergency stop came behind the request for
+    /// it, of which there had been so many: they are not to be enabled. One that comes from here on acts on the way. The loop that
+    /// drives.
+    #[must_use]
+    pub fn begin_enabling(&self, emergency_stops: u64) -> bool {
+        let mut inner = self.lock();
+        (inner.order, inner.aborting) = (None, false);
+        if inner.emergency_stops != emergency_stops {
+            return false;
+        }
+        (inner.fault, inner.mode) = (None, Mode::Enabling);
+        // Clients ask for one under this lock: it is in force before this, and counted, or behind it.
+        let stop = &self.hub.controls().emergency_stop;
+        stop.store(false, Relaxed);
+        drop(inner);
+        self.begun();
+        true
+    }
+
+    /// What was seen of the job before is over.
+    fn begun(&self) {
         *self.seen() = Seen::default();
         self.hub.begin_job();
         self.tell_state();
-        true
     }
 
     /// What was ordered is not begun: lines that wait for it are not going to be driven, and a hold that it was to begin with is over.

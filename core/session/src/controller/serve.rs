@@ -190,6 +190,7 @@ impl<'r> Controller<'r> {
             desk.lock().order = Some(Order::Enable {
                 from: From { client: 0, id: 0 },
                 resets: false,
+                emergency_stops: 0,
             });
         }
         let server = if options.listen.is_nowhere() {
@@ -333,10 +334,18 @@ impl<'r> Controller<'r> {
                 let job = self.resident.homing(HOMING, axis);
                 self.drive_or_tell(job, Some(from), Mode::Homing, "homing", tell)?;
             }
-            Order::Enable { from, resets } => self.enable(from, resets, tell),
+            Order::Enable {
+                from,
+                resets,
+                emergency_stops,
+            } => self.enable(from, resets, emergency_stops, tell),
             Order::Disable { from } => {
                 while !self.resident.disable() {
-                    self.idle(tell)?;
+                    if let Some(words) = self.idle(tell)? {
+                        // Whoever asked is answered with it.
+                        self.desk.fault(&words);
+                        return Ok(());
+                    }
                 }
                 let mut inner = self.desk.lock();
                 (inner.enabled, inner.order) = (false, None);
@@ -527,12 +536,12 @@ impl<'r> Controller<'r> {
         self.desk.finish(mode, name, outcome, unknown);
     }
 
-    fn enable(&mut self, from: From, resets: bool, tell: Tell<'_>) {
-        let mut inner = self.desk.lock();
-        inner.fault = None;
-        drop(inner);
-        // Nothing stops the drives on their way but what stops them there.
-        let _ = self.desk.begin(Mode::Enabling);
+    fn enable(&mut self, from: From, resets: bool, emergency_stops: u64, tell: Tell<'_>) {
+        if !self.desk.begin_enabling(emergency_stops) {
+            self.desk.answer(from, Err(STOPPED.to_string()));
+            self.desk.tell_state();
+            return;
+        }
         let mut watch = Watch::new(
             &self.desk,
             &mut self.script,

@@ -189,6 +189,60 @@ fn a_stop_overtakes_what_is_about_to_begin() {
     }
 }
 
+/// Drives that are to be enabled stay without torque where an emergency stop comes behind the request, whether they have begun to or not.
+#[test]
+fn an_emergency_stop_behind_a_reset_or_an_enabling_is_in_force() {
+    let slow = machine_with(
+        "mill-3axis.toml",
+        &[("driver.options.enable_s", "[0.2, 0.2, 0.2]")],
+    );
+    for request in ["reset", "enable"] {
+        for later in [0, 1, 8, 50] {
+            let mut says = Says::new();
+            let before = ["emergency-stop", "disable"][usize::from(request == "enable")];
+            says.ask(900, before, json!({}));
+            let begins = says.ask(1000, request, json!({}));
+            let stop = says.ask(later, "emergency-stop", json!({}));
+            let after = says.ask(2000, "status", json!({}));
+            // Taken back behind it, the machine is ready.
+            says.ask(10, "reset", json!({}));
+            let back = says.ask(2000, "status", json!({}));
+            let told = Told::by(&slow, says, |_| (), Box::new(NoKeeper));
+            told.ok(stop);
+            let place = format!("{later} periods behind {request}");
+            assert!(told.answer(begins).get("error").is_some(), "{place}");
+            assert_eq!(told.ok(after)["state"], "emergency-stop", "{place}");
+            assert_eq!(told.ok(back)["state"], "ready", "{place}");
+        }
+    }
+}
+
+/// While drives let go, and behind it, an emergency stop is one: what was asked for is answered, and a reset takes it back.
+#[test]
+fn an_emergency_stop_while_drives_let_go_is_in_force() {
+    let slow = machine_with(
+        "mill-3axis.toml",
+        &[("driver.options.brake_s", "[0.2, 0.2, 0.2]")],
+    );
+    for later in [0, 1, 8, 50, 150, 1000] {
+        let mut says = Says::new();
+        let disable = says.ask(900, "disable", json!({}));
+        let stop = says.ask(later, "emergency-stop", json!({}));
+        let after = says.ask(2000, "status", json!({}));
+        says.ask(10, "reset", json!({}));
+        let back = says.ask(2000, "status", json!({}));
+        let told = Told::by(&slow, says, |_| (), Box::new(NoKeeper));
+        told.ok(stop);
+        told.answer(disable);
+        assert_eq!(
+            told.ok(after)["state"],
+            "emergency-stop",
+            "{later} periods behind"
+        );
+        assert_eq!(told.ok(back)["state"], "ready", "{later} periods behind");
+    }
+}
+
 /// Whenever a step is asked for while the one before is driven, ends or has ended, it is driven too.
 #[test]
 fn a_jog_that_is_asked_for_in_any_period_of_the_one_before_is_driven() {
