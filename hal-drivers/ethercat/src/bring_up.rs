@@ -8,6 +8,7 @@ use tandem_sdk::DriverContext;
 
 use crate::beside::Mailboxes;
 use crate::check::MAX_DEVICES;
+use crate::clock::Leading;
 use crate::coe::{MAX_REPEATS, Objects, caught, may_pass};
 use crate::cyclic::{Area, Station};
 use crate::drive::{self, Constants, Drive, Moves};
@@ -27,6 +28,7 @@ const AL_STATUS: u16 = 0x0130;
 const AL_CODE: u16 = 0x0134;
 const WATCHDOG_DIVIDER: u16 = 0x0400;
 const WATCHDOG_TIME: u16 = 0x0420;
+const SYSTEM_TIME: u16 = 0x0910;
 const FMMU: u16 = 0x0600;
 
 /// Divider of the watchdogs for counts of 100 µs, which is what devices have at power-on too.
@@ -77,8 +79,8 @@ pub(crate) struct Ready {
 pub(crate) struct Up {
     /// In the order in which a frame meets them.
     pub(crate) devices: Vec<Ready>,
-    /// The station whose clock leads.
-    pub(crate) reference: Option<u16>,
+    /// The station whose clock leads, and that clock.
+    pub(crate) reference: Option<(u16, Leading)>,
     /// By which their objects are reached from then on.
     pub(crate) mailboxes: Mailboxes,
 }
@@ -184,6 +186,7 @@ async fn attempt(
             drive,
         });
     }
+    let mut leads = None;
     let mailboxes = if dc {
         let period = Duration::from_secs_f64(context.fine_period_s);
         let start_delay = Duration::from_millis(FIRST_SYNC_MS);
@@ -192,10 +195,20 @@ async fn attempt(
             sync0_period: period,
             sync0_shift: Duration::ZERO,
         };
+        // SYNC0 comes in whole numbers of periods of what the clock shows in between.
+        let before_ns = shown_ns(main, reference).await?;
         let configured = mapped.configure_dc_sync(main, configuration).await;
         let mapped = configured.map_err(|error| {
             format!("distributed clocks: {error}; sync = \"free-run\" does without them")
         })?;
+        let after_ns = shown_ns(main, reference).await?;
+        if after_ns < before_ns {
+            let words =
+                "distributed clocks: the first of them begins anew each time that SYNC0 is set up";
+            return Err(Refused::ForNow(words.to_string()));
+        }
+        let leading = Leading::new(after_ns, time::now_ns());
+        leads = reference.map(|station| (station, leading));
         Mailboxes::Clocks(Box::new(mapped))
     } else {
         Mailboxes::FreeRun(Box::new(mapped))
@@ -205,8 +218,21 @@ async fn attempt(
     }
     Ok(Up {
         devices: ready,
-        reference,
+        reference: leads,
         mailboxes,
+    })
+}
+
+/// What the clock that leads shows; 0 where there is none.
+async fn shown_ns(main: &MainDevice<'static>, reference: Option<u16>) -> Result<u64, String> {
+    let Some(station) = reference else {
+        return Ok(0);
+    };
+    let shown = Command::fprd(station, SYSTEM_TIME)
+        .receive::<u64>(main)
+        .await;
+    shown.map_err(|error| {
+        format!("distributed clocks: the first device that has one does not tell its time: {error}")
     })
 }
 

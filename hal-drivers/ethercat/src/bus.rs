@@ -12,6 +12,7 @@ use tandem_sdk::{
 use crate::beside::Mailboxes;
 use crate::bring_up::{self, Ready, refuses};
 use crate::check::emulated;
+use crate::clock::{Leading, phase};
 use crate::cyclic::Cyclic;
 use crate::drive::{Drive, Moves};
 use crate::link::Link;
@@ -95,6 +96,8 @@ pub(crate) struct Bus {
     asks: usize,
     last: Setpoint,
     phase_ns: Option<i64>,
+    /// The clock that leads; none where frames do.
+    leading: Option<Leading>,
     /// Frames in a row that came back without the time of the clock that leads.
     clock_misses: u32,
     pub(crate) counters: Counters,
@@ -129,6 +132,7 @@ impl Bus {
             asks: 0,
             last: Setpoint::default(),
             phase_ns: None,
+            leading: None,
             clock_misses: 0,
             counters: Counters::default(),
             sent: false,
@@ -155,7 +159,8 @@ impl Bus {
         link.renew(&options.interface)?;
         let up = master.run(link, |main| bring_up::bring_up(main, options, context))?;
         let stations: Vec<_> = up.devices.iter().map(|device| device.station).collect();
-        let mut cyclic = Cyclic::new(&stations, up.reference)?;
+        let mut cyclic = Cyclic::new(&stations, up.reference.map(|(station, _)| station))?;
+        self.leading = up.reference.map(|(_, leading)| leading);
         cyclic.ask(0);
         self.cyclic = Some(cyclic);
         self.mailboxes = Some(Arc::new(up.mailboxes));
@@ -389,8 +394,11 @@ impl Bus {
                 }
             }
         }
-        self.phase_ns =
-            clock_ns.map(|clock_ns| phase(clock_ns, self.period_ns, self.options.phase_us));
+        let now_ns = self.link.now_ns();
+        self.phase_ns = clock_ns
+            .zip(self.leading.as_mut())
+            .map(|(shown_ns, leading)| leading.time_ns(shown_ns, now_ns))
+            .map(|clock_ns| phase(clock_ns, self.period_ns, self.options.phase_us));
         self.ask_on(came);
     }
 
@@ -409,6 +417,7 @@ impl Bus {
         feedback.latches = [tandem_sdk::Latch::default(); tandem_sdk::MAX_LATCHES];
         let mut latches = 0;
         let mut spindle_trouble = None;
+        let mut without_joint = None;
         for member in &mut self.members {
             let options = &self.options.devices[member.ready.options];
             if member.lost.is_none() {
@@ -419,6 +428,9 @@ impl Bus {
                 feedback.input_age_periods[*line as usize % MAX_DIGITAL] = age;
             }
             let (lost, silent) = (member.lost, member.silent);
+            if let Some(why) = lost.filter(|_| options.joint.is_none() && options.is_used()) {
+                without_joint.get_or_insert(own::of_device(member.ready.options, why));
+            }
             let Some(drive) = &mut member.ready.drive else {
                 continue;
             };
@@ -431,24 +443,30 @@ impl Bus {
                     }
                 }
                 Moves::Spindle { at_speed_share, .. } => {
-                    let (state, code) =
-                        lost.map_or_else(|| drive.state(), |code| (JointState::Lost, code));
+                    let (state, code) = drive.state();
                     spindle_trouble =
-                        matches!(state, JointState::Fault | JointState::Lost).then_some(code);
+                        (lost.is_none() && state == JointState::Fault).then_some(code);
                     let at_speed = drive.is_at_speed(setpoint.spindle_rad_per_s, at_speed_share);
-                    feedback.spindle_at_speed = u32::from(at_speed && spindle_trouble.is_none());
+                    let turns = spindle_trouble.or(lost).is_none() && at_speed;
+                    feedback.spindle_at_speed = u32::from(turns);
                 }
             }
         }
+        // The contract has no state for a spindle and none for a terminal: what stops the axes on their ramps is a joint's.
         let joints = self.context.joint_count as usize;
-        if let Some(code) = spindle_trouble
-            && joints > 0
-            && feedback.state[..joints]
-                .iter()
-                .all(|state| *state == JointState::Enabled)
-        {
-            // The contract has no state for a spindle: what stops the axes on their ramps is a joint's.
+        let all_hold = feedback.state[..joints]
+            .iter()
+            .all(|state| *state == JointState::Enabled);
+        if let Some(code) = spindle_trouble.filter(|_| joints > 0 && all_hold) {
             (feedback.state[0], feedback.fault_code[0]) = (JointState::Fault, own::SPINDLE + code);
+        }
+        // A joint that has a reason of its own has the better one, and one that is being let go of is waited for.
+        let has_reason = |state: &JointState| [JointState::Fault, JointState::Lost].contains(state);
+        let is_told = joints > 0
+            && feedback.state[0] != JointState::QuickStop
+            && !feedback.state[..joints].iter().any(has_reason);
+        if let Some(code) = without_joint.filter(|_| is_told) {
+            (feedback.state[0], feedback.fault_code[0]) = (JointState::Lost, code);
         }
         // Where nothing was heard, the clock is not steered by what was heard before.
         (feedback.has_phase, feedback.phase_ns) =
@@ -654,30 +672,9 @@ fn merge(latches: &mut [tandem_sdk::Latch], count: usize, latch: tandem_sdk::Lat
     }
 }
 
-/// How much later than its phase an exchange passed the clock that leads, ns; within half a period either way.
-fn phase(clock_ns: u64, period_ns: u64, phase_us: Option<f64>) -> i64 {
-    let wanted_ns = phase_us.map_or(period_ns / 2, |phase| (phase * 1000.0) as u64);
-    let late_ns =
-        ((clock_ns % period_ns + period_ns - wanted_ns % period_ns) % period_ns).cast_signed();
-    if late_ns > (period_ns / 2).cast_signed() {
-        late_ns - period_ns.cast_signed()
-    } else {
-        late_ns
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_phase_is_within_half_a_period() {
-        assert_eq!(phase(7_000_300_000, 1_000_000, Some(300.0)), 0);
-        assert_eq!(phase(7_000_310_000, 1_000_000, Some(300.0)), 10_000);
-        assert_eq!(phase(7_000_290_000, 1_000_000, Some(300.0)), -10_000);
-        assert_eq!(phase(7_000_900_000, 1_000_000, Some(300.0)), -400_000);
-        assert_eq!(phase(7_000_500_000, 1_000_000, None), 0);
-    }
 
     /// Numbers from 0 to below 1 that are the same for a seed.
     fn drawn(state: &mut u64) -> f64 {

@@ -12,10 +12,10 @@ use tandem_sdk::{
 
 use crate::bus::{Bus, Counters};
 use crate::check;
-use crate::options::{EMULATED, Options, number};
+use crate::options::{DeviceOptions, EMULATED, Options, number};
 use crate::requests::{Desk, Request};
 use crate::survey::Value;
-use crate::words::joint_code;
+use crate::words::{joint_code, own};
 
 /// Periods without an exchange of the host's, after which the driver keeps its bus alive by itself, and the share of the devices'
 /// watchdog, where that is longer: a host that is only late is not taken for a silent one, which stops what moves.
@@ -329,6 +329,16 @@ impl Driver for EthercatDrives {
     }
 
     fn explain(&self, joint: u32, code: u32) -> Words {
+        if let Some((number, why)) = own::device(code) {
+            let device = self.options.devices.get(number);
+            let title = device.map_or_else(String::new, DeviceOptions::title);
+            let words = if device.is_some_and(DeviceOptions::is_drive) {
+                joint_code(own::SPINDLE + why)
+            } else {
+                joint_code(why)
+            };
+            return Words::new(format!("{title}: {words}"));
+        }
         let name = self
             .context
             .joints
@@ -346,9 +356,8 @@ impl Driver for EthercatDrives {
                 .find(|known| number(&known.code) == Some(code))
         });
         let words = own.map_or_else(|| joint_code(code), |known| known.text.clone());
-        let place = device.and_then(|device| device.position);
-        match place.filter(|_| !words.is_empty()) {
-            Some(place) => Words::new(format!("device {place}: {words}")),
+        match device.filter(|_| !words.is_empty()) {
+            Some(device) => Words::new(format!("{}: {words}", device.title())),
             None => Words::new(words),
         }
     }

@@ -13,6 +13,7 @@ mod beside;
 mod bring_up;
 mod bus;
 mod check;
+mod clock;
 mod coe;
 mod cyclic;
 mod drive;

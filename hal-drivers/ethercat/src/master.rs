@@ -57,6 +57,8 @@ impl Master {
             // A computer without real-time scheduling may keep a process waiting for so long.
             pdu: Duration::from_millis(100),
             eeprom: Duration::from_millis(500),
+            // Longer than a frame that is lost and sent again takes.
+            mailbox_echo: Duration::from_millis(500),
             mailbox_response: Duration::from_secs(1),
             ..Timeouts::default()
         };

@@ -339,6 +339,20 @@ impl DeviceOptions {
         self.joint.is_some() || self.spindle.is_some()
     }
 
+    /// What a fault calls it: `device 2`.
+    pub(crate) fn title(&self) -> String {
+        match (self.position, self.alias) {
+            (Some(position), _) => format!("device {position}"),
+            (None, alias) => format!("the device of alias {}", alias.unwrap_or_default()),
+        }
+    }
+
+    /// Whether the machine moves, reads or switches anything by it.
+    pub(crate) fn is_used(&self) -> bool {
+        let any = |lines: &[i32]| lines.iter().any(|line| *line >= 0);
+        self.is_drive() || any(&self.inputs) || any(&self.outputs) || !self.analog.is_empty()
+    }
+
     /// What messages call it: `device 2 (z)`.
     pub(crate) fn called(&self, place: usize) -> String {
         let name = if self.name.is_empty() {

@@ -22,6 +22,21 @@ pub(crate) mod own {
     pub(crate) const NEVER_ENABLED: u32 = 0x3_0000;
     /// Added to a code of the spindle's drive, which no joint has.
     pub(crate) const SPINDLE: u32 = 0x10_0000;
+    /// Bit of the code by which a device is lost that moves no joint; its number in the options and why are in the others.
+    const DEVICE: u32 = 0x4000_0000;
+    /// Bits of why.
+    const WHY_BITS: u32 = 20;
+
+    /// Why the device of this number in the options is lost, as the code of a joint.
+    pub(crate) fn of_device(number: usize, why: u32) -> u32 {
+        DEVICE | (number as u32) << WHY_BITS | why & ((1 << WHY_BITS) - 1)
+    }
+
+    /// The number of the device in the options, and why it is lost, where a code says so.
+    pub(crate) fn device(code: u32) -> Option<(usize, u32)> {
+        let number = (code & !DEVICE) >> WHY_BITS;
+        (code & DEVICE != 0).then_some((number as usize, code & ((1 << WHY_BITS) - 1)))
+    }
 }
 
 /// What a state of the bus is called.
@@ -207,6 +222,11 @@ mod tests {
         );
         assert_eq!(joint_code(0x7305), "encoder 1");
         assert_eq!(joint_code(0x73FE), "sensor");
+        assert_eq!(
+            own::device(own::of_device(31, 0x1_002C)),
+            Some((31, 0x1_002C))
+        );
+        assert_eq!(own::device(own::SPINDLE + own::NO_ANSWER), None);
         assert_eq!(joint_code(0x0815), "");
         assert_eq!(
             (status(0x1637), status(0x1208)),

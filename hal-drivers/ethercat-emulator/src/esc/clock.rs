@@ -175,15 +175,12 @@ impl Clock {
         self.filter_depth = depth & 15;
     }
 
-    /// Compares the system time with the reference's and changes the clock's speed accordingly.
-    pub(crate) fn compensate(&mut self, at_ns: u64, reference: u64, bytes: usize) {
-        let own = self.system(at_ns);
-        let due = reference.wrapping_add(u64::from(self.delay));
-        let difference = if bytes < 8 || self.kind == Clocking::Bits32 {
-            f64::from((own as u32).wrapping_sub(due as u32).cast_signed())
-        } else {
-            own.wrapping_sub(due).cast_signed() as f64
-        };
+    /// Compares the low halves of the system time and of the reference's, as devices do whatever the width of their clocks, and
+    /// changes the clock's speed accordingly.
+    pub(crate) fn compensate(&mut self, at_ns: u64, reference: u32) {
+        let own = self.system(at_ns) as u32;
+        let due = reference.wrapping_add(self.delay);
+        let difference = f64::from(own.wrapping_sub(due).cast_signed());
         self.mean_difference +=
             (difference - self.mean_difference) / f64::from(1_u32 << self.filter_depth);
         let elapsed = self
@@ -316,7 +313,7 @@ mod tests {
         let reference = Clock::new(Clocking::Bits64, 5, 0);
         let mut clock = Clock::new(Clocking::Bits64, start_ns, drift_ppb);
         for at in (0..writes).map(|n| n * step) {
-            clock.compensate(at, reference.system(at), 8);
+            clock.compensate(at, reference.system(at) as u32);
         }
         let end = writes * step;
         clock

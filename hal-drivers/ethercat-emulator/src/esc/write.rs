@@ -1,7 +1,7 @@
 //! What follows from a master's write.
 
 use super::{Esc, MEMORY, registers as at};
-use crate::bytes::{number_at, u16_at, u32_at, u64_at};
+use crate::bytes::{u16_at, u32_at, u64_at};
 
 impl Esc {
     /// A master writes; answers whether the working counter counts it.
@@ -82,9 +82,7 @@ impl Esc {
             self.clock.set_filter_depth(self.memory[at::FILTER_DEPTHS]);
         }
         if start == at::SYSTEM_TIME && data.len() >= 4 {
-            let bytes = data.len().min(8);
-            self.clock
-                .compensate(at_ns, number_at(data, 0, bytes), bytes);
+            self.clock.compensate(at_ns, u32_at(data, 0));
         }
         if touches(at::SYNC0_START, 8) {
             self.clock.sync.start = u64_at(&self.memory, at::SYNC0_START);

@@ -2,7 +2,6 @@
 
 use crate::common;
 
-use proptest::prelude::*;
 use tandem_ethercat::{EthercatDrives, Options};
 use tandem_ethercat_emulator::{AlCode, AlState, DriveState, What};
 use tandem_sdk::{
@@ -14,25 +13,25 @@ const PERIOD_S: f64 = 0.001;
 /// Counts for a mm, or for a rad times 2π.
 const COUNTS: f64 = 8388.608;
 
-struct Rig {
-    driver: EthercatDrives,
-    setpoint: Setpoint,
-    feedback: Feedback,
-    attached: Attached,
+pub struct Rig {
+    pub driver: EthercatDrives,
+    pub setpoint: Setpoint,
+    pub feedback: Feedback,
+    pub attached: Attached,
 }
 
-fn drive(position: u32, joint: &str, more: &str) -> String {
+pub fn drive(position: u32, joint: &str, more: &str) -> String {
     format!(
         "[[devices]]\nposition = {position}\nproduct = \"0x0e1a:0x0402\"\njoint = \"{joint}\"\ncounts_per_mm = {COUNTS}\n{more}\n"
     )
 }
 
-fn emulated(more: &str) -> String {
+pub fn emulated(more: &str) -> String {
     format!("[[emulated.devices]]\nkind = \"drive\"\n{more}\n")
 }
 
 impl Rig {
-    fn open(text: &str, names: &[&str]) -> (EthercatDrives, DriverContext) {
+    pub fn open(text: &str, names: &[&str]) -> (EthercatDrives, DriverContext) {
         let options = Options::read(&format!("interface = \"emulated\"\n{text}")).unwrap();
         let driver = EthercatDrives::new(&options).unwrap();
         let mut context = DriverContext::new(names.len(), PERIOD_S);
@@ -42,14 +41,18 @@ impl Rig {
         (driver, context)
     }
 
-    fn of(text: &str, names: &[&str]) -> Self {
+    pub fn of(text: &str, names: &[&str]) -> Self {
         let (driver, context) = Self::open(text, names);
         Self::with(driver, &context)
     }
 
-    fn with(mut driver: EthercatDrives, context: &DriverContext) -> Self {
+    pub fn with(mut driver: EthercatDrives, context: &DriverContext) -> Self {
         driver.open(context).unwrap();
         let attached = driver.start().unwrap();
+        Self::started(driver, attached)
+    }
+
+    pub fn started(driver: EthercatDrives, attached: Attached) -> Self {
         let (setpoint, feedback) = common::begin(&attached);
         Self {
             driver,
@@ -59,7 +62,7 @@ impl Rig {
         }
     }
 
-    fn exchange(&mut self) {
+    pub fn exchange(&mut self) {
         self.setpoint.tick += 1;
         self.driver
             .exchange(&self.setpoint, &mut self.feedback)
@@ -68,7 +71,7 @@ impl Rig {
     }
 
     /// Until joint 0 is in a state; fails after 2 s.
-    fn until(&mut self, state: JointState) {
+    pub fn until(&mut self, state: JointState) {
         for _ in 0..2000 {
             self.exchange();
             if self.feedback.state[0] == state {
@@ -81,14 +84,14 @@ impl Rig {
         );
     }
 
-    fn enable(&mut self) {
+    pub fn enable(&mut self) {
         self.setpoint.enable = 1;
         self.until(JointState::Enabled);
         self.setpoint.position = self.feedback.position;
     }
 
     /// Moves joint 0 by so much in every period.
-    fn go(&mut self, step: f64) {
+    pub fn go(&mut self, step: f64) {
         self.setpoint.position[0] += step;
         self.setpoint.velocity[0] = step / PERIOD_S;
         self.exchange();
@@ -102,15 +105,18 @@ impl Rig {
             .copied()
     }
 
-    fn emulator<T>(&mut self, look: impl FnOnce(&mut tandem_ethercat_emulator::Wire) -> T) -> T {
+    pub fn emulator<T>(
+        &mut self,
+        look: impl FnOnce(&mut tandem_ethercat_emulator::Wire) -> T,
+    ) -> T {
         self.driver.with_emulator(look).unwrap()
     }
 
-    fn inject(&mut self, what: What) {
+    pub fn inject(&mut self, what: What) {
         self.emulator(|wire| wire.inject(what, None)).unwrap();
     }
 
-    fn drive_state(&mut self) -> (AlState, Option<AlCode>, DriveState) {
+    pub fn drive_state(&mut self) -> (AlState, Option<AlCode>, DriveState) {
         self.emulator(|wire| {
             let device = &wire.bus().devices()[0];
             (
@@ -286,6 +292,80 @@ fn a_fault_in_any_state_stays_until_it_is_reset() {
         rig.setpoint.reset = 1;
         rig.until(JointState::Disabled);
         rig.enable();
+    }
+}
+
+/// How a drive comes to where a fault meets it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Way {
+    /// It is enabled.
+    Up,
+    /// It moves, and is stopped.
+    QuickStop,
+    /// It moves, and has another fault.
+    Fault,
+}
+
+/// The same behind any exchange on the way up, in a quick stop and in the reaction to another fault, so that each state of CiA 402 has
+/// had one.
+#[test]
+fn a_fault_in_each_state_of_cia_402_is_told_by_its_code() {
+    let mut met = vec![];
+    let fault = |code: u16| What::DriveFault {
+        device: 0,
+        code,
+        stays: false,
+    };
+    let mut meets = |way: Way, exchanges: u32| {
+        let place = emulated(
+            "drive = { brake_open_ms = 20.0, quick_stop_deceleration_counts_per_s2 = 4000000 }",
+        );
+        let mut rig = Rig::of(&format!("{}{place}", drive(0, "x", "")), &["x"]);
+        if way == Way::Up {
+            rig.setpoint.enable = u32::from(exchanges > 0);
+        } else {
+            rig.enable();
+            (0..100).for_each(|_| rig.go(0.05));
+        }
+        match way {
+            Way::Up => {}
+            Way::QuickStop => rig.driver.quick_stop(),
+            Way::Fault => rig.inject(fault(0x7305)),
+        }
+        (0..exchanges).for_each(|_| rig.exchange());
+        let state = rig.drive_state().2;
+        if !met.contains(&state) {
+            met.push(state);
+        }
+        rig.inject(fault(0x8611));
+        (0..200).for_each(|_| rig.exchange());
+        assert_eq!(rig.feedback.state[0], JointState::Fault, "{state:?}");
+        // In a fault, and on its way there, it is the first one that it shows, or the last.
+        let is_in_fault = matches!(state, DriveState::FaultReactionActive | DriveState::Fault);
+        let code = rig.feedback.fault_code[0];
+        assert!(
+            code == 0x8611 || is_in_fault && code == 0x7305,
+            "{state:?}, behind {exchanges} exchanges: {code:#x}"
+        );
+        (rig.setpoint.reset, rig.setpoint.enable) = (1, 0);
+        rig.until(JointState::Disabled);
+        rig.enable();
+    };
+    (0..40).for_each(|exchanges| meets(Way::Up, exchanges));
+    for exchanges in [2, 5, 150] {
+        meets(Way::QuickStop, exchanges);
+        meets(Way::Fault, exchanges);
+    }
+    for state in [
+        DriveState::SwitchOnDisabled,
+        DriveState::ReadyToSwitchOn,
+        DriveState::SwitchedOn,
+        DriveState::OperationEnabled,
+        DriveState::QuickStopActive,
+        DriveState::FaultReactionActive,
+        DriveState::Fault,
+    ] {
+        assert!(met.contains(&state), "{state:?} is none of {met:?}");
     }
 }
 
@@ -561,107 +641,6 @@ fn what_a_drive_does_by_itself_is_compared_with_the_machine_file() {
     ] {
         assert_eq!(start(of_machine, &of_drive), None, "{of_machine}");
     }
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig { cases: 6, ..ProptestConfig::default() })]
-
-    /// Whatever the drifts and the shift, no SYNC0 is without a new setpoint, and the frame keeps its phase.
-    #[test]
-    fn with_distributed_clocks_no_sync0_is_without_a_setpoint(
-        ppm in prop::array::uniform3(-100.0..100.0_f64),
-        phase_us in 200.0..800.0_f64,
-    ) {
-        let names = ["x", "y", "z"];
-        let drives: String = (0..).zip(names).map(|(position, name)| drive(position, name, "")).collect();
-        let clocks: String = ppm.iter().map(|ppm| emulated(&format!("drift_ppm = {ppm:?}"))).collect();
-        let mut rig = Rig::of(&format!("sync = \"dc\"\nphase_us = {phase_us:?}\n{drives}{clocks}"), &names);
-        let before: Vec<u64> = counters(&mut rig, |counters| counters.sync0_without_outputs);
-        let mut worst_ns = 0;
-        for _ in 0..2000 {
-            rig.exchange();
-            prop_assert_eq!(rig.feedback.has_phase, 1);
-            worst_ns = worst_ns.max(rig.feedback.phase_ns.abs());
-        }
-        prop_assert!(counters(&mut rig, |counters| counters.sync0).iter().all(|sync0| *sync0 > 2000));
-        prop_assert_eq!(counters(&mut rig, |counters| counters.sync0_without_outputs), before);
-        prop_assert!(worst_ns < 10_000, "phase error {worst_ns} ns");
-        prop_assert_eq!(rig.attached.delay_periods[0], 2);
-    }
-}
-
-fn counters(rig: &mut Rig, of: impl Fn(tandem_ethercat_emulator::Counters) -> u64) -> Vec<u64> {
-    rig.emulator(|wire| {
-        wire.bus()
-            .devices()
-            .iter()
-            .map(|device| of(device.counters()))
-            .collect()
-    })
-}
-
-/// What goes wrong with a clock in operation is a lost joint with the reason, never a silent one.
-#[test]
-fn missed_sync0_and_lost_clocks_are_told() {
-    let of = |more: &str| {
-        format!(
-            "sync = \"dc\"\n{}{}{}{}",
-            drive(0, "x", ""),
-            drive(1, "y", ""),
-            emulated(more),
-            emulated("")
-        )
-    };
-    let mut rig = Rig::of(&of(""), &["x", "y"]);
-    rig.enable();
-    // A jump is slewed back.
-    rig.inject(What::ClockJump {
-        device: 1,
-        by_ns: 50_000,
-    });
-    (0..1000).for_each(|_| rig.exchange());
-    assert_eq!(rig.feedback.state[..2], [JointState::Enabled; 2]);
-    rig.inject(What::AlError {
-        device: 0,
-        state: AlState::SafeOp,
-        code: AlCode::SYNC_ERROR,
-    });
-    rig.until(JointState::Lost);
-    assert_eq!(rig.feedback.fault_code[0], 0x1_001A);
-    assert_eq!(
-        rig.feedback.state[1],
-        JointState::Enabled,
-        "the other one goes on"
-    );
-    // One SYNC0 that a drive misses passes; several are its fault, by its own code.
-    let mut rig = Rig::of(&of(""), &["x", "y"]);
-    rig.enable();
-    rig.inject(What::MissedSync {
-        device: 0,
-        pulses: 1,
-    });
-    (0..100).for_each(|_| rig.exchange());
-    assert_eq!(rig.feedback.state[..2], [JointState::Enabled; 2]);
-    // The clock that leads is gone: nobody is steered by what it said before, and the joints do not drift on in silence.
-    rig.inject(What::LostClock { device: 0 });
-    for _ in 0..2 {
-        rig.exchange();
-        assert_eq!(rig.feedback.has_phase, 0);
-        assert_eq!(rig.feedback.state[..2], [JointState::Enabled; 2]);
-    }
-    rig.exchange();
-    assert_eq!(rig.feedback.state[0], JointState::Lost);
-    assert_eq!(
-        rig.feedback.state[1],
-        JointState::Lost,
-        "it followed that clock"
-    );
-    let why = rig.driver.explain(0, rig.feedback.fault_code[0]);
-    assert!(
-        why.as_str().contains("the clock that leads"),
-        "{}",
-        why.as_str()
-    );
 }
 
 /// Terminals: bits and words of any device are the lines and values that the options name.
