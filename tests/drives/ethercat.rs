@@ -9,7 +9,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use tandem_host::{Clock, Run, Switches};
+use tandem_host::{Clock, Command as Order, Run, Switches, Timed};
 use tandem_machine::Machine;
 use tandem_rig::Random;
 
@@ -18,16 +18,21 @@ use crate::{Samples, program, registry};
 /// All joints move, one past the end of the 32 bits that its drive counts in.
 const SHORT: &str = "G21 G90 G94 F4000\nG1 X0.25 Y-0.3 Z0.2\nG1 X0 Y0 Z-0.1\nM2\n";
 
-/// Three drives and a terminal, with a machine of its own for every seed: limits, counts, directions, patience, period.
-fn table(seed: u64, faults: &str, options: &str) -> String {
+/// One in so many frames is tried with each kind of trouble.
+const ONE_IN: u64 = 4;
+
+/// Three drives, a terminal and up to three drives more behind it that hold, with a machine of its own for every seed: limits, counts,
+/// directions, period, drives.
+pub fn table(seed: u64, faults: &str, options: &str) -> String {
     let mut random = Random::new(seed);
     let mut text = "format = 1\n[planner]\nplugin = \"look-ahead\"\n".to_string();
-    let period_ms = random.pick(&[1, 2]);
+    let period_ms = random.pick(&[0.25, 0.5, 1.0, 2.0]);
+    let axes = &["x", "y", "z", "u", "v", "w"][..3 + random.below(4) as usize];
     text += &format!(
         "[loops]\nfine_period_ms = {period_ms}\nrough_period_ms = {}\n",
-        8 * period_ms
+        8.0 * period_ms
     );
-    for axis in ["x", "y", "z"] {
+    for axis in axes {
         text += &format!(
             "[axes.{axis}]\ntravel_mm = [-250, 250]\nmax_feed_mm_per_min = {}\nmax_acceleration_mm_per_s2 = {}\n\
              max_following_error_mm = 2\n",
@@ -35,13 +40,16 @@ fn table(seed: u64, faults: &str, options: &str) -> String {
             500 + random.below(1500)
         );
     }
-    text += "[drivers.bus]\nplugin = \"ethercat\"\njoints = [\"x\", \"y\", \"z\"]\ninputs = [0, 1, 2, 3]\n\
-             [drivers.bus.options]\ninterface = \"emulated\"\n";
+    text += &format!(
+        "[drivers.bus]\nplugin = \"ethercat\"\njoints = {axes:?}\ninputs = [0, 1, 2, 3]\n\
+         [drivers.bus.options]\ninterface = \"emulated\"\n"
+    );
     text += &format!(
         "max_lost_frames = 2\nwatchdog_ms = {}\n{options}\n",
-        20 * period_ms
+        20.0 * period_ms
     );
-    for (position, axis) in ["x", "y", "z"].iter().enumerate() {
+    for (number, axis) in axes.iter().enumerate() {
+        let position = number + usize::from(number > 2);
         let counts = 1000 + random.below(9000);
         let zero = if *axis == "y" {
             i64::from(i32::MAX) - 500
@@ -62,6 +70,9 @@ fn table(seed: u64, faults: &str, options: &str) -> String {
     );
     text += "[[drivers.bus.options.emulated.devices]]\nkind = \"drive\"\ndrive = { brake_open_ms = 40.0, brake_close_ms = 30.0 }\n";
     text += "[[drivers.bus.options.emulated.devices]]\nkind = \"digital-inputs\"\n";
+    for _ in 3..axes.len() {
+        text += "[[drivers.bus.options.emulated.devices]]\nkind = \"drive\"\n";
+    }
     text + faults
 }
 
@@ -93,6 +104,29 @@ pub fn seeds() -> u64 {
         .unwrap_or(1)
 }
 
+/// A part of what is tried, which is drawn anew each time; all where `TANDEM_EVERY` is set.
+pub struct Part {
+    one_in: usize,
+    from: usize,
+}
+
+impl Part {
+    /// One in so many.
+    pub fn drawn(one_in: u64) -> Self {
+        let is_long = std::env::var_os("TANDEM_EVERY").is_some();
+        let one_in = if is_long { 1 } else { one_in };
+        Self {
+            one_in: one_in as usize,
+            from: Random::from_the_clock().below(one_in) as usize,
+        }
+    }
+
+    /// Those of the part.
+    pub fn of<T>(&self, all: impl IntoIterator<Item = T>) -> impl Iterator<Item = T> {
+        all.into_iter().skip(self.from).step_by(self.one_in)
+    }
+}
+
 /// What a run came to: its samples, and the words of its fault or of its refusal.
 pub struct Ran {
     pub samples: Samples,
@@ -106,6 +140,11 @@ fn ran(text: &str) -> Ran {
 
 /// Runs a program on the machine of this file.
 pub fn ran_with(text: &str, of_program: &str, switches: Switches) -> Ran {
+    ran_by(text, of_program, switches, &[])
+}
+
+/// The same, with an operator.
+fn ran_by(text: &str, of_program: &str, switches: Switches, operator: &[Timed]) -> Ran {
     let machine = machine(text);
     let run = match Run::prepare(machine, &registry(), program(of_program), switches) {
         Ok(run) => run,
@@ -118,7 +157,7 @@ pub fn ran_with(text: &str, of_program: &str, switches: Switches) -> Ran {
         }
     };
     let mut samples = Samples::default();
-    match run.drive(Clock::Virtual, &[], &mut samples) {
+    match run.drive(Clock::Virtual, operator, &mut samples) {
         Ok(outcome) => Ran {
             samples,
             fault: outcome.summary.fault,
@@ -189,11 +228,41 @@ pub fn frames_of(ran: impl Fn(&str) -> Ran) -> (u64, u64) {
 /// What goes wrong for good at any frame is a fault that names the device and says why; the joints come to rest within their limits.
 #[test]
 fn whatever_goes_wrong_in_any_frame_is_named_and_the_joints_come_to_rest() {
+    let part = Part::drawn(ONE_IN);
     for seed in 0..seeds() {
         let (first, count) = frames(seed);
         for (lasts, what, words) in [
             ("ms = 1e6", "kind = \"lost-reply\"", "no frame comes back"),
             ("ms = 1e6", "kind = \"lost-request\"", "no frame comes back"),
+            // One more than the driver is patient with.
+            ("cycles = 3", "kind = \"lost-reply\"", "no frame comes back"),
+            (
+                "ms = 1e6",
+                "kind = \"late\", by_us = 9000.0",
+                "no frame comes back",
+            ),
+            (
+                "ms = 1e6",
+                "kind = \"corrupt\", byte = 20, mask = 255",
+                "no frame comes back",
+            ),
+            (
+                "cycles = 3",
+                "kind = \"deaf\", device = 2",
+                "device 2: the working counter says",
+            ),
+            // The terminal is the machine's too.
+            (
+                "",
+                "kind = \"cut\", behind = 2",
+                "device 3: the working counter says",
+            ),
+            (
+                "",
+                "kind = \"deaf\", device = 3",
+                "device 3: the working counter says",
+            ),
+            ("", "kind = \"mode-shown\", device = 0, mode = 3", "axis X"),
             (
                 "",
                 "kind = \"cut\", behind = 1",
@@ -253,7 +322,7 @@ fn whatever_goes_wrong_in_any_frame_is_named_and_the_joints_come_to_rest() {
             ),
             ("", "kind = \"power-cycle\", device = 1", "device 1: "),
         ] {
-            for n in first..first + count - 4 {
+            for n in part.of(first..first + count - 4) {
                 let case = format!(
                     "seed {seed}: {what} in frame {n}, {} of the program",
                     n - first
@@ -273,6 +342,7 @@ fn whatever_goes_wrong_in_any_frame_is_named_and_the_joints_come_to_rest() {
 /// What is over within the driver's patience, and what no device was meant by, changes not one command.
 #[test]
 fn what_passes_within_patience_changes_no_command() {
+    let part = Part::drawn(ONE_IN);
     for seed in 0..seeds() {
         let (first, count) = frames(seed);
         let whole = ran(&table(seed, "", ""));
@@ -300,8 +370,20 @@ fn what_passes_within_patience_changes_no_command() {
             ("cycles = 2", "kind = \"deaf\", device = 1", 2),
             ("cycles = 2", "kind = \"cut\"", 2),
             ("cycles = 1", "kind = \"cut\", behind = 0", 1),
+            // Mailboxes are none of the process data.
+            ("", "kind = \"silent-mailbox\", device = 1", 0),
+            (
+                "",
+                "kind = \"sdo-abort\", device = 1, index = 0x6085, abort = 0x06010000",
+                0,
+            ),
+            (
+                "",
+                "kind = \"emergencies\", device = 1, messages = 9, code = 0x6100",
+                0,
+            ),
         ] {
-            for n in first..first + count - 6 {
+            for n in part.of(first..first + count - 6) {
                 let case = format!(
                     "seed {seed}: {what} in frame {n}, {} of the program",
                     n - first
@@ -327,6 +409,27 @@ fn what_passes_within_patience_changes_no_command() {
                 let back = ran.samples.0.last().unwrap().age_periods[1];
                 assert_eq!(back, 0, "{case}: it is new again");
             }
+        }
+    }
+}
+
+/// An emergency stop in any period: the drives are told a ramp within their limits, and then to stop by themselves.
+#[test]
+fn an_emergency_stop_in_any_period_comes_to_rest_within_the_limits() {
+    let part = Part::drawn(ONE_IN);
+    for seed in 0..seeds() {
+        let text = table(seed, "", "");
+        let (_, count) = frames(seed);
+        for tick in part.of(0..count - 4) {
+            let case = format!("seed {seed}: at tick {tick}");
+            let stop = Timed {
+                tick,
+                command: Order::EmergencyStop,
+            };
+            let ran = ran_by(&text, SHORT, Switches::default(), &[stop]);
+            judge(&case, &text, &ran.samples);
+            let told = ran.fault.unwrap_or_default();
+            assert!(told.contains("emergency stop"), "{case}: {told}");
         }
     }
 }
@@ -414,16 +517,21 @@ fn another_bus_is_refused_with_what_is_there() {
     let text = table(4, "", "");
     let emulated = "[[drivers.bus.options.emulated.devices]]\n";
     let of_file = "[[drivers.bus.options.devices]]\nposition = 1\n";
+    let count = text.matches(emulated).count();
+    let there = |devices: usize| {
+        format!("{devices} devices are on the bus, and the machine file has {count}")
+    };
+    let (one_less, one_more) = (there(count - 1), there(count + 1));
     for (case, changed, words) in [
         (
             "one device less",
             text.replacen(&format!("{emulated}kind = \"digital-inputs\"\n"), "", 1),
-            "3 devices are on the bus, and the machine file has 4",
+            one_less.as_str(),
         ),
         (
             "one more",
             format!("{text}{emulated}kind = \"coupler\"\n"),
-            "5 devices are on the bus, and the machine file has 4",
+            one_more.as_str(),
         ),
         (
             "swapped",

@@ -36,6 +36,11 @@ impl Task {
 
     /// Two drives of a machine drawn from a seed, with these faults of the bus.
     fn table(self, seed: u64, faults: &str) -> String {
+        self.table_of(seed, faults, 0.45)
+    }
+
+    /// The same, with the edge of the probe there.
+    fn table_of(self, seed: u64, faults: &str, edge_mm: f64) -> String {
         let mut random = Random::new(seed + 40);
         let mut text = "format = 1\n[planner]\nplugin = \"look-ahead\"\n".to_string();
         for axis in ["x", "y"] {
@@ -82,7 +87,7 @@ impl Task {
                  counts_per_mm = {counts}\n{homing}{probe}"
             );
             let counts = counts as f64;
-            let (limit, turn, edge) = (-0.3 * counts, 0.4 * counts, 0.45 * counts);
+            let (limit, turn, edge) = (-0.3 * counts, 0.4 * counts, edge_mm * counts);
             let _ = writeln!(
                 devices,
                 "[[drivers.bus.options.emulated.devices]]\nkind = \"drive\"\ndrift_ppm = {:.1}\n\
@@ -233,6 +238,38 @@ fn frames_that_are_lost_while_drives_home_change_no_place() {
 #[test]
 fn frames_that_are_lost_while_a_probe_is_awaited_change_no_place_that_was_touched() {
     passes(Task::Probing, 0.001);
+}
+
+/// An edge in each period of the block that awaits it, and between periods: the program goes on from the drive's own place at it.
+#[test]
+fn an_edge_in_any_period_of_a_block_is_the_place_that_was_touched() {
+    for seed in 0..seeds() {
+        let whole = Task::Probing.ran(seed, "");
+        // Of the way to the edge, which is the same with each.
+        let way = whole.samples.0.iter().map(|sample| sample.command[1]);
+        let mut places: Vec<f64> = way
+            .take_while(|y| *y < 0.45)
+            .filter(|y| *y > 0.02)
+            .collect();
+        places.dedup();
+        assert!(places.len() > 10, "{places:?}");
+        for pair in places.windows(2) {
+            for share in [0.02, 0.5, 0.98] {
+                let edge_mm = pair[0] + share * (pair[1] - pair[0]);
+                let text = Task::Probing.table_of(seed, "", edge_mm);
+                let ran = ran_with(&text, Task::Probing.program(), Switches::default());
+                let case = format!("seed {seed}, an edge at {edge_mm} mm");
+                assert_eq!(ran.fault, None, "{case}");
+                judge(&case, &text, &ran.samples);
+                let touched_mm = ends(&ran)[1] + 0.2;
+                // A count, and what the edge is rounded to in the file.
+                assert!(
+                    (touched_mm - edge_mm).abs() < 0.0012,
+                    "{case}: {touched_mm}"
+                );
+            }
+        }
+    }
 }
 
 /// Clocks that jump, are lost, or miss a pulse at any frame of a program.

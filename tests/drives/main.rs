@@ -2,6 +2,7 @@
 //!
 //! `TANDEM_SEEDS=n` asks for more random faults than usual.
 
+mod after;
 mod cable;
 #[path = "../counting_allocator.rs"]
 mod counting_allocator;
