@@ -61,6 +61,7 @@ mod smooth_limits;
 mod smooth_peers;
 mod starvation;
 mod state;
+mod stopped_early;
 mod stopping_time;
 mod stops;
 mod switched;

@@ -23,13 +23,17 @@ pub enum Trouble {
     Refused(String),
     /// The controller is gone, or says what nobody understands.
     Gone(String),
+    /// A signal or a key has stopped the command before it moved anything.
+    Stopped,
 }
 
 impl Trouble {
     /// The words.
     pub fn words(&self) -> &str {
-        let (Self::Refused(words) | Self::Gone(words)) = self;
-        words
+        match self {
+            Self::Refused(words) | Self::Gone(words) => words,
+            Self::Stopped => "stopped by the operator: nothing was begun",
+        }
     }
 }
 
@@ -167,7 +171,7 @@ impl Connection {
             match self.ask("lease", json!({ "how": "release" })) {
                 // Another client has taken it over.
                 Ok(_) | Err(Trouble::Refused(_)) => {}
-                Err(gone) => return Err(gone),
+                Err(other) => return Err(other),
             }
         }
         Ok(())

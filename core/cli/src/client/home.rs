@@ -25,7 +25,7 @@ fn driven(work: &mut Work, options: &args::Home) -> Result<u8, Trouble> {
         || json!({}),
         |axis| json!({ "axis": axis.to_ascii_lowercase().to_string() }),
     );
-    work.connection.ask("home", with)?;
+    work.ask_to_move("home", with)?;
     let _keys = work.take_keys();
     let end = work.follow("home", &mut |_| ())?;
     end.tell();

@@ -173,7 +173,7 @@ impl Jogs {
                         }
                     };
                     match done {
-                        Ok(()) => {}
+                        Ok(()) | Err(Trouble::Stopped) => {}
                         Err(Trouble::Refused(why)) => self.refuse(column, &why),
                         Err(gone) => return Err(gone),
                     }
@@ -190,7 +190,7 @@ impl Jogs {
         match line {
             Line::Jog(words) => {
                 let with = request(words, &self.axes).map_err(Trouble::Refused)?;
-                self.work.connection.ask("jog", with)?;
+                self.work.ask_to_move("jog", with)?;
                 self.moving.store(true, Relaxed);
                 if matches!(words.reach, ReachMessage::By(_)) {
                     self.rest()?;
@@ -208,7 +208,7 @@ impl Jogs {
                 let _ = writeln!(stdout(), "{}", shown_position(&status["position"], 4));
             }
             Line::Reset => {
-                self.work.connection.ask("reset", json!({}))?;
+                self.work.ask_to_move("reset", json!({}))?;
                 self.fault = false;
             }
             Line::Command(command) => give(&*self.work.panel, *command)?,

@@ -69,7 +69,7 @@ fn answered(connection: &mut Connection, options: &args::Ask) -> Result<u8, Trou
         .ask(request, Value::Object(with))
         .map_err(|trouble| match trouble {
             Trouble::Refused(why) => Trouble::Refused(format!("{request}: {why}")),
-            gone @ Trouble::Gone(_) => gone,
+            other => other,
         })?;
     say_out(&ok.to_string());
     if !["mdi", "start", "home", "jog"].contains(&request) {

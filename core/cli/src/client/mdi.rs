@@ -109,10 +109,10 @@ impl Dialogue {
             .or_else(|trouble| self.refuse(trouble))?;
         let with = || json!({ "line": line });
         let early = self.ahead > 0;
-        let mut said = self.work.connection.ask("mdi", with());
+        let mut said = self.work.ask_to_move("mdi", with());
         if early && matches!(said, Err(Trouble::Refused(_))) {
             self.rest()?;
-            said = self.work.connection.ask("mdi", with());
+            said = self.work.ask_to_move("mdi", with());
         }
         match said {
             Ok(_) => {
@@ -127,7 +127,7 @@ impl Dialogue {
     fn reset(&mut self) -> Result<(), Trouble> {
         self.rest()?;
         let done = self.work.connection.take_lease();
-        match done.and_then(|()| self.work.connection.ask("reset", json!({}))) {
+        match done.and_then(|()| self.work.ask_to_move("reset", json!({}))) {
             Ok(_) => {
                 self.fault = false;
                 Ok(())
@@ -143,6 +143,8 @@ impl Dialogue {
                 tell(&self.numbered(&why));
                 Ok(())
             }
+            // What is driven comes to its end first.
+            Trouble::Stopped => Ok(()),
             gone @ Trouble::Gone(_) => Err(gone),
         }
     }

@@ -93,7 +93,7 @@ fn driven(work: &mut Work, options: &args::Run, text: &str) -> Result<JobEnd, Tr
         say!("{}", warning.as_str().unwrap_or_default());
     }
     work.subscribe()?;
-    work.connection.ask("start", json!({}))?;
+    work.ask_to_move("start", json!({}))?;
     let keys = work.take_keys();
     let on_terminal = stderr().is_terminal();
     let end = work.follow("program", &mut |told| {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use serde_json::{Value, json};
+use tandem_host::Command;
 
 use super::connection::{Connection, Trouble};
 use super::panel::RemotePanel;
@@ -93,6 +94,25 @@ impl Work {
         self.signals.stops()
     }
 
+    /// Asks for what moves the machine; no more once a stop was asked for. One that comes meanwhile may reach the controller before
+    /// anything is driven, which refuses it then: it is said once more behind what it is to stop.
+    ///
+    /// # Errors
+    /// The controller refuses, or is gone; or a stop was asked for.
+    pub fn ask_to_move(&mut self, request: &str, with: Value) -> Result<Value, Trouble> {
+        let stops = self.stops();
+        if stops.are_asked() {
+            return Err(Trouble::Stopped);
+        }
+        let done = self.connection.ask(request, with)?;
+        if stops.are_asked() {
+            self.connection
+                .voice
+                .say(Command::Abort.name(), json!({}))?;
+        }
+        Ok(done)
+    }
+
     /// Feeds the keys with the status of the machine.
     ///
     /// # Errors
@@ -125,10 +145,10 @@ impl Work {
                 .iter()
                 .any(|state| status["state"] == *state)
         {
-            self.connection.ask("reset", json!({}))?;
+            self.ask_to_move("reset", json!({}))?;
         }
         if homes {
-            self.connection.ask("home", json!({}))?;
+            self.ask_to_move("home", json!({}))?;
             let end = self.follow("home", &mut |_| ())?;
             if !end.is_done() {
                 end.tell();
@@ -202,7 +222,7 @@ pub fn tell_trouble(trouble: &Trouble) -> u8 {
     tell(trouble.words());
     match trouble {
         Trouble::Refused(_) => REFUSED,
-        Trouble::Gone(_) => FAULT,
+        Trouble::Gone(_) | Trouble::Stopped => FAULT,
     }
 }
 

@@ -138,7 +138,7 @@ impl Client<UnixStream> {
         client
     }
 
-    fn until_state(&mut self, state: &str) {
+    pub fn until_state(&mut self, state: &str) {
         while self.ok("status", json!({}))["state"] != state {
             std::thread::yield_now();
         }
@@ -161,7 +161,7 @@ impl<S: Read + Write> Client<S> {
     }
 
     /// Says it, and goes on; the id.
-    fn say(&mut self, request: &str, mut with: Value) -> u64 {
+    pub fn say(&mut self, request: &str, mut with: Value) -> u64 {
         let id = self.next;
         self.next += 1;
         (with["id"], with["request"]) = (json!(id), json!(request));
@@ -183,7 +183,7 @@ impl<S: Read + Write> Client<S> {
         }
     }
 
-    fn answer(&mut self, id: u64) -> Value {
+    pub fn answer(&mut self, id: u64) -> Value {
         self.wait(|told| told["id"] == id && told.get("event").is_none())
     }
 

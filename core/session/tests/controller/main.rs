@@ -7,6 +7,7 @@ mod page;
 mod queued;
 mod scale;
 mod seeing;
+mod stopped;
 mod support;
 mod truth;
 mod watched;
