@@ -23,6 +23,7 @@ mod homing;
 mod jerk_stops;
 mod jog;
 mod keys;
+mod killed;
 mod kinematics;
 mod late;
 mod latency;
