@@ -24,7 +24,7 @@ fn max_growth_bytes(asked_by: &str) -> i64 {
     if std::env::var_os(asked_by).is_some() {
         5_000_000
     } else {
-        30_000_000
+        100_000_000
     }
 }
 
