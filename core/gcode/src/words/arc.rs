@@ -171,7 +171,13 @@ fn circle(line: &Line, ends: &Ends, plane: [usize; 2]) -> Checked<Parts> {
         .plane
         .letters()
         .map(|letter| letter - b'X' + b'I');
-    if let Some(foreign) = (b'I'..=b'K').find(|l| line.words.has(*l) && !letters.contains(l)) {
+    // An offset of zero across the plane says what is so: CAM systems for grbl write all three.
+    let says_nothing =
+        |letter: u8| !line.state.modes.arc_absolute && line.words.get(letter) == Some(0.0);
+    let is_foreign = |letter: &u8| {
+        line.words.has(*letter) && !letters.contains(letter) && !says_nothing(*letter)
+    };
+    if let Some(foreign) = (b'I'..=b'K').find(is_foreign) {
         let [a, b] = letters.map(char::from);
         let message = format!(
             "{} is no centre in this plane: {a} and {b} are (G17, G18, G19 choose)",
@@ -272,7 +278,7 @@ fn check_arc_travel(
 
 #[cfg(test)]
 mod tests {
-    use crate::testing::{blocks, last, short};
+    use crate::testing::{blocks, last, messages, short};
 
     #[test]
     fn helices_in_every_plane() {
@@ -295,6 +301,26 @@ mod tests {
         );
         let turning = last("F60 G2 I5 A360");
         assert_eq!(short(turning.length_mm), short(10.0 * std::f64::consts::PI));
+    }
+
+    #[test]
+    fn an_offset_of_zero_across_the_plane_says_nothing() {
+        for (with, without) in [
+            ("F60 G2 X10 I5 K0.000", "F60 G2 X10 I5"),
+            ("F60 G18 G3 X10 Z10 K10 J0", "F60 G18 G3 X10 Z10 K10"),
+            ("F60 G2 X10 R5 K0", "F60 G2 X10 R5"),
+        ] {
+            let [with, without] = [with, without].map(|text| format!("{:?}", blocks(text)));
+            assert_eq!(with, without);
+        }
+        for wrong in [
+            "F60 G2 X10 I5 K0.1",
+            "F60 G90.1 G2 X10 I5 J0 K0",
+            "F60 G2 X10 K0",
+        ] {
+            let found = messages(wrong);
+            assert!(found[0].contains("[arc-centre]"), "{wrong}: {found:?}");
+        }
     }
 
     #[test]
