@@ -21,6 +21,15 @@ pub struct Tool {
     pub diameter_mm: f64,
 }
 
+/// What M6 does before the tool is another one, beside resting and stopping the spindle.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ToolChange {
+    /// Machine coordinate of Z to which the tool is taken up by a rapid, where it stands lower, mm.
+    pub retract_z_mm: Option<f64>,
+    /// The subroutine that changes the tool, by the name of its file; where there is none, whoever operates the machine does.
+    pub sub: Option<String>,
+}
+
 /// The input of the probe, for G31 and G38.2 to G38.5.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ProbeInput {
@@ -82,6 +91,8 @@ pub struct Config {
     pub tools: Vec<Tool>,
     /// Where the tool table is empty: G43 H takes the length of every tool as zero, instead of being refused.
     pub zero_length_without_table: bool,
+    /// How tools are changed.
+    pub tool_change: ToolChange,
     /// Tool in the spindle at the start, 0 for none.
     pub tool_in_spindle: u32,
     /// Least and greatest time constant that TA may ask for, s.
@@ -131,6 +142,7 @@ impl Config {
             reference: [AxisVector::ZERO; 2],
             tools: Vec::new(),
             zero_length_without_table: false,
+            tool_change: ToolChange::default(),
             tool_in_spindle: 0,
             time_constant_s: (0.0, f64::INFINITY),
             block_delete: false,

@@ -311,9 +311,23 @@ impl Interpreter {
         if self.state.ended {
             return Ok(());
         }
-        if self.calls(text) {
+        if self.calls_sub(text) {
             return by_hand::call(self, number, text, out);
         }
+        if self.may_change_tool(text) {
+            return by_hand::with_tool_change(self, number, text, out);
+        }
+        self.plain_line(number, text, out)
+    }
+
+    /// A line that calls nothing, or whose call somebody else obeys.
+    #[inline]
+    pub(crate) fn plain_line(
+        &mut self,
+        number: u32,
+        text: &[u8],
+        out: &mut Vec<Item>,
+    ) -> Result<(), Diagnostic> {
         let items_before = out.len();
         let (next_index, at_rest) = (self.state.path.next_index, self.state.path.at_rest);
         self.state.line = self.reported_line.unwrap_or(number);
@@ -327,11 +341,35 @@ impl Interpreter {
         })
     }
 
-    /// Whether [`Self::line`] executes the subroutine that `text` calls, and reads its file.
+    /// Whether [`Self::line`] may execute a subroutine for `text`, and read its file.
     pub fn calls(&self, text: &[u8]) -> bool {
+        self.calls_sub(text) || self.may_change_tool(text)
+    }
+
+    #[inline]
+    fn calls_sub(&self, text: &[u8]) -> bool {
         !self.state.subprograms.obeyed
             && o_word::find(text, self.config.block_delete)
                 .is_some_and(|at| by_hand::is_call(text, at))
+    }
+
+    /// Whether a line by hand may call the subroutine that changes tools.
+    #[inline]
+    fn may_change_tool(&self, text: &[u8]) -> bool {
+        !self.state.subprograms.obeyed
+            && self.config.tool_change.sub.is_some()
+            && text.iter().any(|byte| matches!(byte, b'm' | b'M'))
+    }
+
+    /// The subroutine that changes tools begins.
+    pub(crate) fn begin_tool_change(&mut self) {
+        self.state.tools.changing = true;
+    }
+
+    /// It has ended: `number` is in the spindle.
+    pub(crate) fn end_tool_change(&mut self, number: u32) {
+        self.state.tools.changing = false;
+        self.state.tools.in_spindle = number;
     }
 
     /// Ends the program at the end of its text, as M2 would.

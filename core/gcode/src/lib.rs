@@ -62,6 +62,7 @@ mod words;
 pub use check::{CheckReport, MAX_DIAGNOSTICS, check};
 pub use config::{
     Config, DEFAULT_MAX_STEPS, FIRST_USER_COMMAND, LAST_USER_COMMAND, Lines, ProbeInput, Tool,
+    ToolChange,
 };
 pub use diagnostic::{Diagnostic, Severity, Sketch};
 pub use interpreter::{Interpreter, MAX_LINE_BYTES};

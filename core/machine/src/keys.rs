@@ -153,6 +153,8 @@ static MACHINE: &[Key] = &[
     key("operator.jog_keep_alive_ms", "ms", "200", "Time without a keep-alive, as key repeats are, after which a jog stops"),
     key("tools.table", "file", "required", "Tool table; without it there are no tools"),
     key("tools.without_table", "text", "none", "zero: instead of `table`, every tool has length zero; simulated drives do so without it"),
+    key("tools.change", "text", "ask", "How M6 changes tools: ask, whoever operates the machine; sub:NAME, the subroutine `o<NAME>` of `program.subroutine_path`, with the number of the tool as #1 and that of the one in the spindle as #2"),
+    key("tools.retract_z_mm", "mm", "none", "Machine coordinate of Z up to which M6 takes the tool by a rapid before it is changed"),
     key("program.subroutine_path", "file", "none", "Folder of files that O-word calls look up: `o<name> call` runs `name.ngc`"),
     key("program.max_steps", "number", "50000000", "Lines that a program with O-words may execute in the check"),
     key("user_commands.<command>", "file", "none", "Program that the word runs at rest, M100 to M199, with the values of P and Q as its arguments; nothing is run that is not listed"),

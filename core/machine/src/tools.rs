@@ -38,6 +38,10 @@ pub struct ToolTable {
     pub tools: Vec<Tool>,
     /// There is no file, and the machine says that every tool has length zero then.
     pub zero_without_table: bool,
+    /// The subroutine that changes tools; none where whoever operates the machine does.
+    pub change_sub: Option<String>,
+    /// Machine coordinate of Z up to which the tool is taken before a change, mm.
+    pub retract_z_mm: Option<f64>,
 }
 
 impl ToolTable {
@@ -49,9 +53,15 @@ impl ToolTable {
     /// Reads `[tools]` and the file that it names; what is wrong is reported and left out.
     pub(crate) fn read(tools: &Section<'_>, axes: &Axes, problems: &Problems) -> Option<Self> {
         let zero = tools.choice("without_table", &[("zero", true)]);
-        if zero.is_some() && !tools.has("table") {
+        let change_sub = change_sub(tools);
+        let retract_z_mm = retract_z_mm(tools, axes);
+        // How tools are changed is no table: what is said of machines without one holds.
+        let without = ["change", "retract_z_mm"].iter().any(|key| tools.has(key));
+        if (zero.is_some() || without) && !tools.has("table") {
             return Some(Self {
-                zero_without_table: true,
+                zero_without_table: zero.is_some(),
+                change_sub,
+                retract_z_mm,
                 ..Self::default()
             });
         }
@@ -65,8 +75,38 @@ impl ToolTable {
             path: Some(path),
             tools,
             zero_without_table: false,
+            change_sub,
+            retract_z_mm,
         })
     }
+}
+
+/// The name of the subroutine that changes tools: that of its file.
+fn change_sub(tools: &Section<'_>) -> Option<String> {
+    let text = tools.text("change")?;
+    if text == "ask" {
+        return None;
+    }
+    let fits = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-');
+    let name = text.strip_prefix("sub:").unwrap_or_default();
+    if name.is_empty() || !name.chars().all(fits) {
+        tools.refuse(
+            "change",
+            format!("must be ask, or sub: and a name of letters, digits, _ and -, not {text}"),
+        );
+        return None;
+    }
+    Some(name.to_ascii_lowercase())
+}
+
+fn retract_z_mm(tools: &Section<'_>, axes: &Axes) -> Option<f64> {
+    let up_mm = tools.number("retract_z_mm")?;
+    let z = (0..axes.count()).find(|axis| axes.letter(*axis).eq_ignore_ascii_case(&'Z'));
+    if z.is_none_or(|axis| axes.is_rotary(axis)) {
+        tools.refuse("retract_z_mm", "the machine has no linear axis z");
+        return None;
+    }
+    Some(up_mm)
 }
 
 fn read_file(path: &Path, from: Named, axes: &Axes, problems: &Problems) -> Option<Vec<Tool>> {

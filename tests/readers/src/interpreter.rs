@@ -13,6 +13,7 @@ fn config() -> Config {
         input: 0,
         inverted: false,
     });
+    config.tool_change.retract_z_mm = Some(50.0);
     config.max_steps = 10_000;
     config.user_commands.extend([101, 150]);
     for number in [1, 2] {

@@ -10,6 +10,7 @@ use crate::item::Item;
 use crate::line_error::{LineError, Span};
 use crate::program::lines::Pass;
 use crate::program::{Program, ProgramError};
+use crate::words::subprogram::Jump;
 
 /// Most lines that a call by hand may execute: all of them are, before the first of them moves.
 const MAX_LINES: u32 = 100_000;
@@ -54,6 +55,40 @@ pub(crate) fn call(
         }
         diagnostic
     })
+}
+
+/// Executes a line, and the subroutine that changes tools where the line calls it.
+///
+/// # Errors
+/// As in [`call`].
+#[cold]
+pub(crate) fn with_tool_change(
+    interpreter: &mut Interpreter,
+    number: u32,
+    text: &[u8],
+    out: &mut Vec<Item>,
+) -> Result<(), Diagnostic> {
+    let before = interpreter.clone();
+    let items_before = out.len();
+    interpreter.plain_line(number, text, out)?;
+    let Some((Jump::ToolChange { number: tool }, _)) = interpreter.take_jump() else {
+        return Ok(());
+    };
+    let name = interpreter.config().tool_change.sub.clone();
+    let line = format!(
+        "o<{}> call [{tool}] [{}]",
+        name.unwrap_or_default(),
+        interpreter.tool_in_spindle()
+    );
+    interpreter.begin_tool_change();
+    let done = call(interpreter, number, line.as_bytes(), out);
+    if done.is_err() {
+        *interpreter = before;
+        out.truncate(items_before);
+    } else {
+        interpreter.end_tool_change(tool);
+    }
+    done
 }
 
 fn execute(

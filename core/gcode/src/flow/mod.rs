@@ -49,6 +49,8 @@ struct Frame {
     after: Mark,
     call_line: u32,
     callee: Callee,
+    /// The tool that is in the spindle when it returns, where it changes tools.
+    changes_to: Option<u32>,
     /// Loops that the caller is in.
     repeats: usize,
 }
@@ -81,6 +83,8 @@ pub(crate) struct Execution {
     steps: u64,
     /// The loop that has gone back last.
     last_loop: Option<Loop>,
+    /// Something has decided where the program goes on: when it begins again it may go another way.
+    decided: bool,
     /// The line that was executed last, in its chunk.
     last: Range<usize>,
     /// Its text, where it may have led elsewhere.
@@ -109,6 +113,7 @@ impl Execution {
             repeats: Repeats::default(),
             steps: 0,
             last_loop: None,
+            decided: false,
             last: 0..0,
             text: Vec::new(),
             is_kept: false,
@@ -239,7 +244,7 @@ impl Execution {
         Step::Wrong(self.called(diagnostic))
     }
 
-    /// M98 and M99.
+    /// M98 and M99, and M6 where a subroutine changes tools.
     #[cold]
     fn leap(
         &mut self,
@@ -250,7 +255,16 @@ impl Execution {
     ) -> Result<Step, ProgramError> {
         self.keep_text();
         let number = self.sources.current().lines.number;
+        self.decided |= matches!(jump, Jump::Call { .. });
         let error = match jump {
+            Jump::End if self.frames.is_empty() && !self.decided => {
+                let message = "M99 begins the program again, and nothing in it decides where it goes on: it would never end \
+                               (M2 or M30 ends a program)";
+                let error = LineError::new(Span::new(0, self.text().len()), "endless", message);
+                let text = self.text();
+                let diagnostic = Diagnostic::new(self.interpreter.file(), number, text, error);
+                return Ok(Step::Stuck(diagnostic));
+            }
             Jump::Call { .. } if assumed && self.pass == Pass::First => {
                 let text = self.text.clone();
                 return Ok(self.open(number, &text));
@@ -266,6 +280,10 @@ impl Execution {
             Jump::End => match self.end_program(program, out)? {
                 Ok(()) => return Ok(Step::Line),
                 Err(why) => LineError::new(Span::new(0, self.text().len()), "o-word", why),
+            },
+            Jump::ToolChange { number: tool } => match self.change_tool(program, tool)? {
+                Ok(step) => return Ok(step),
+                Err(why) => LineError::new(Span::new(0, self.text().len()), "tool", why),
             },
         };
         let diagnostic = Diagnostic::new(self.interpreter.file(), number, self.text(), error);
@@ -299,6 +317,7 @@ impl Execution {
                 start,
                 left: times - 1,
             },
+            changes_to: None,
             repeats: self.repeats.len(),
         });
         self.interpreter.enter_subprogram();
@@ -376,6 +395,7 @@ impl Execution {
         if decides && self.assumes() {
             return Ok(self.open(entry.number, text));
         }
+        self.decided |= decides || matches!(entry.word.label, Label::Computed(_));
         match entry.word.keyword {
             Keyword::Call => return self.call(program, &entry, text),
             Keyword::Return | Keyword::EndSub => return self.end_call(program, &entry, text, out),
@@ -592,25 +612,66 @@ impl Execution {
                 Ok(found) => found,
                 Err(why) => return Ok(Step::Wrong(refuse(self, why))),
             };
+        self.enter(program, (target, sub), entry.number, None)
+    }
+
+    /// Calls a subroutine, as an entry of a file, with the values that have been read.
+    fn enter(
+        &mut self,
+        program: &mut Program,
+        (target, sub): (usize, usize),
+        call_line: u32,
+        changes_to: Option<u32>,
+    ) -> Result<Step, ProgramError> {
         let called = self.sources.get(target).outline.as_ref();
         let wrong = called.and_then(|outline| outline.wrong(outline.entry(sub).number));
         if let Some(wrong) = wrong {
             return Ok(Step::Stuck(self.called(wrong.clone())));
         }
-        let after = self.sources.current().lines.mark();
-        let (call_line, repeats) = (entry.number, self.repeats.len());
         self.frames.push(Frame {
             file: self.sources.current,
-            after,
+            after: self.sources.current().lines.mark(),
             call_line,
             callee: Callee::Sub(sub),
-            repeats,
+            changes_to,
+            repeats: self.repeats.len(),
         });
         self.interpreter.enter_sub(&self.values);
         self.switch_to(program, target);
         let start = self.sources.outline().entry(sub).after;
         self.jump(program, start)?;
         Ok(Step::Line)
+    }
+
+    /// M6: calls the subroutine that changes tools, with the number of the next tool and that of the one in the spindle.
+    fn change_tool(
+        &mut self,
+        program: &mut Program,
+        tool: u32,
+    ) -> Result<Result<Step, String>, ProgramError> {
+        if self.frames.len() == MAX_CALLS {
+            return Ok(Err(too_deep()));
+        }
+        let config = self.interpreter.config();
+        let name = config.tool_change.sub.clone().unwrap_or_default();
+        let found = match self.sources.find_sub_of_file(program, &name, config)? {
+            Ok(found) => found,
+            Err(why) => {
+                return Ok(Err(format!(
+                    "the tool cannot be changed by o<{name}>: {why}"
+                )));
+            }
+        };
+        let number = |number: u32| Value {
+            number: f64::from(number),
+            assumed: false,
+        };
+        self.values.clear();
+        let in_spindle = self.interpreter.tool_in_spindle();
+        self.values.extend([tool, in_spindle].map(number));
+        self.interpreter.begin_tool_change();
+        let line = self.sources.current().lines.number;
+        self.enter(program, found, line, Some(tool)).map(Ok)
     }
 
     /// `return` and `endsub`.
@@ -639,6 +700,9 @@ impl Execution {
         };
         self.interpreter
             .leave_sub(self.values.first().copied(), out);
+        if let Some(tool) = frame.changes_to {
+            self.interpreter.end_tool_change(tool);
+        }
         self.repeats.truncate(frame.repeats);
         self.switch_to(program, frame.file);
         self.jump(program, frame.after)?;

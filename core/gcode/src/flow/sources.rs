@@ -107,6 +107,16 @@ impl Sources {
                 return Ok(Ok((which, sub)));
             }
         }
+        self.find_sub_of_file(program, label, config)
+    }
+
+    /// The same in a file of its own alone: no program has another one of this name.
+    pub fn find_sub_of_file(
+        &mut self,
+        program: &mut Program,
+        label: &str,
+        config: &Config,
+    ) -> Result<Result<(usize, usize), String>, ProgramError> {
         let which = match self.file_of(program, label, config)? {
             Ok(which) => which,
             Err(why) => return Ok(Err(why)),

@@ -16,6 +16,8 @@ pub(crate) struct Tools {
     pub in_spindle: u32,
     /// What T has selected.
     pub selected: Option<u32>,
+    /// The subroutine that changes tools is being executed: M6 in it is the change itself.
+    pub changing: bool,
     /// The first line that has taken the length of a tool as zero, because there is no table.
     pub assumed_zero: Option<u32>,
 }
@@ -26,6 +28,7 @@ impl Tools {
             table: Arc::new(config.tools.clone()),
             in_spindle: config.tool_in_spindle,
             selected: None,
+            changing: false,
             assumed_zero: None,
         }
     }

@@ -37,9 +37,11 @@ pub(crate) enum Jump {
     },
     /// M99.
     End,
+    /// M6 where a subroutine changes tools: to tool `number`.
+    ToolChange { number: u32 },
 }
 
-/// What M98 and M99 ask of whoever executes the lines.
+/// What M98, M99 and M6 ask of whoever executes the lines.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Subprograms {
     /// Somebody obeys: the lines are those of a program.

@@ -1,11 +1,12 @@
 //! T, M6, G43, G49: the tool and its length.
 
-use tandem_sdk::{AxisVector, EventKind};
+use tandem_sdk::{AxisVector, BlockKind, EventKind};
 
-use super::{Action, Group, Word, spindle};
+use super::subprogram::Jump;
+use super::{Action, Group, Word, motion, spindle};
 use crate::line::Line;
 use crate::line_error::Checked;
-use crate::state::letters::AXIS_MASK;
+use crate::state::letters::{AXIS_MASK, mask};
 
 pub(super) const WORDS: &[Word] = &[
     Word::new(
@@ -79,15 +80,61 @@ pub(crate) fn select(line: &mut Line) -> Checked<()> {
 }
 
 /// The spindle stops, as in LinuxCNC: nobody changes the tool of a spindle that turns. Without any T the spindle becomes
-/// empty, as there.
+/// empty, as there. Where the machine has a subroutine that changes tools, it comes first, and M6 in it is the change itself.
 fn change(line: &mut Line) -> Checked<()> {
     let number = line.state.tools.selected.unwrap_or(0);
-    if number != line.state.tools.in_spindle {
-        line.rest();
-        spindle::stop(line);
+    if number == line.state.tools.in_spindle {
+        return Ok(());
+    }
+    let changing = line.state.tools.changing;
+    let sub = line.config.tool_change.sub.as_ref().filter(|_| !changing);
+    if let Some(name) = sub {
+        stands_alone(line, name)?;
+    }
+    line.rest();
+    spindle::stop(line);
+    if !changing {
+        retract(line)?;
+    }
+    if sub.is_some() {
+        line.state.subprograms.jump = Some(Jump::ToolChange { number });
+    } else {
         line.state.tools.in_spindle = number;
         line.event(EventKind::ToolChange, number, 0.0);
     }
+    Ok(())
+}
+
+/// What else the line says would be done before the subroutine, or behind it: nobody is to guess.
+fn stands_alone(line: &Line, name: &str) -> Checked<()> {
+    let alone = line.orders.present() == Group::ToolChange.bit()
+        && line.words.present & !mask("NTFS") == 0
+        && line.words.polar.is_none();
+    if alone {
+        return Ok(());
+    }
+    let message = format!(
+        "M6 calls o<{name}> on this machine: nothing but T, F and S may stand beside it, split the line"
+    );
+    Err(line.orders.error(Group::ToolChange, "conflict", message))
+}
+
+/// Up to where the machine changes tools, where it says so.
+fn retract(line: &mut Line) -> Checked<()> {
+    let (Some(up_mm), Some(z)) = (
+        line.config.tool_change.retract_z_mm,
+        line.letters.axis(b'Z'),
+    ) else {
+        return Ok(());
+    };
+    if line.state.path.position[z] >= up_mm {
+        return Ok(());
+    }
+    line.state.path.position[z] = up_mm;
+    line.state.path.uncertain &= !(1 << z);
+    line.state.path.assumed &= !(1 << z);
+    motion::straight(line, BlockKind::Rapid)?;
+    line.rest();
     Ok(())
 }
 

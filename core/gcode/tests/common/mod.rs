@@ -31,6 +31,17 @@ pub fn mill() -> Config {
     config
 }
 
+/// A folder of subroutines, and a machine that knows it.
+pub fn with_files(files: &[(&str, &str)]) -> (tempfile::TempDir, Config) {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in files {
+        std::fs::write(folder.path().join(name), text).unwrap();
+    }
+    let mut config = mill();
+    config.subroutine_path.push(folder.path().to_path_buf());
+    (folder, config)
+}
+
 /// All items of a program without errors.
 pub fn run(text: &str) -> Vec<Item> {
     let (items, errors) = run_on(mill(), text);

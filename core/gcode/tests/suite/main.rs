@@ -9,4 +9,5 @@ mod probe;
 mod properties;
 mod source;
 mod stated;
+mod tool_change;
 mod words;

@@ -4,7 +4,7 @@ use crate::common;
 
 use std::path::PathBuf;
 
-use common::{mill, only_blocks, short};
+use common::{mill, only_blocks, short, with_files};
 use tandem_gcode::{
     CheckReport, Config, Interpreter, Item, ProbeResult, Program, ProgramError, Stream, check,
 };
@@ -354,7 +354,13 @@ fn m99_begins_the_program_again() {
     assert_eq!(path(text), "7:1 7:2 7:3 5:3");
     let mut config = mill();
     config.max_steps = 1000;
-    let found = errors_on(&config, "G0 X1\nG0 X2\nM99");
+    let found = errors_on(&config, "G0 X1\nM99\nG0 X2");
+    assert!(
+        found.len() == 1
+            && found[0].contains("[endless] M99 begins the program again, and nothing"),
+        "{found:?}"
+    );
+    let found = errors_on(&config, "o1 if [#31]\no1 endif\nM99");
     assert!(
         found[0].contains(
             "[endless] the program, which M99 of line 3 begins again, goes on after 1000 lines"
@@ -422,17 +428,6 @@ fn a_subprogram_that_a_probe_chooses_is_checked_when_it_is_driven() {
         &mill(),
     );
     assert_eq!((report.is_ok(), report.seen_to), (true, Some(2)));
-}
-
-/// A folder of subroutines, and a machine that knows it.
-fn with_files(files: &[(&str, &str)]) -> (tempfile::TempDir, Config) {
-    let folder = tempfile::tempdir().unwrap();
-    for (name, text) in files {
-        std::fs::write(folder.path().join(name), text).unwrap();
-    }
-    let mut config = mill();
-    config.subroutine_path.push(folder.path().to_path_buf());
-    (folder, config)
 }
 
 #[test]

@@ -52,6 +52,8 @@ pub fn interpreter_config(machine: &Machine, simulated: bool, switches: Switches
     config.tools = machine.tools.tools.iter().map(tool).collect();
     config.zero_length_without_table =
         machine.tools.path.is_none() && (machine.tools.zero_without_table || simulated);
+    config.tool_change.retract_z_mm = machine.tools.retract_z_mm;
+    config.tool_change.sub.clone_from(&machine.tools.change_sub);
     // Drives that are simulated take what no real one is known to have.
     if !simulated {
         (config.analog_outputs, config.analog_inputs) = (Lines::none(), Lines::none());

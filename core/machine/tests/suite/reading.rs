@@ -10,11 +10,14 @@ fn full() -> Machine {
     read(&fixtures().join("good/full.toml"), &[]).unwrap()
 }
 
-fn example(name: &str) -> Machine {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+fn example_file(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("../../examples/machines")
-        .join(name);
-    read(&path, &[]).unwrap()
+        .join(name)
+}
+
+fn example(name: &str) -> Machine {
+    read(&example_file(name), &[]).unwrap()
 }
 
 fn letters(machine: &Machine) -> String {
@@ -397,6 +400,33 @@ fn tools() {
     );
     assert_eq!(probe.offset.0[..3], [1.5, -2.0, PI]);
     assert!(machine.tools.get(2).is_none());
+    assert_eq!(
+        (&machine.tools.change_sub, machine.tools.retract_z_mm),
+        (&None, None)
+    );
+}
+
+#[test]
+fn how_tools_are_changed() {
+    let path = example_file("mill-3axis.toml");
+    let changed = |set: &[&str]| read(&path, set).map(|machine| machine.tools);
+    let tools = changed(&[
+        "tools.change=\"sub:Tool-change_2\"",
+        "tools.retract_z_mm=-5.5",
+    ])
+    .unwrap();
+    assert_eq!(tools.change_sub.as_deref(), Some("tool-change_2"));
+    assert_eq!(tools.retract_z_mm, Some(-5.5));
+    // That says nothing of lengths.
+    assert!(tools.tools.is_empty() && !tools.zero_without_table);
+    let both = ["tools.change=\"ask\"", "tools.without_table=\"zero\""];
+    let tools = changed(&both).unwrap();
+    assert!(tools.zero_without_table && tools.change_sub.is_none());
+    for wrong in ["sub", "sub:", "sub:../x", "sub:a b", "hand"] {
+        let set = format!("tools.change=\"{wrong}\"");
+        let words = changed(&[&set]).unwrap_err().to_string();
+        assert!(words.contains("tools.change"), "{wrong}: {words}");
+    }
 }
 
 #[test]
