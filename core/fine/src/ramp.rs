@@ -1,7 +1,8 @@
 //! Ramping out: to rest from the last samples sent, at the limits. Leaves the path; asks no plugin.
 //!
 //! Every axis goes by its own limits. Where joints are sums of axes they go together instead: one law for the whole vector
-//! of velocities, so that every sum of axes goes by it too, and lasts as long as the joint or axis that needs most.
+//! of velocities, so that every sum of axes goes by it too, and lasts as long as the joint or axis that needs most. Along a line
+//! that is the law of a single axis, which goes no farther than a plan that brakes already, as towards the end of the travel.
 
 use tandem_sdk::{AxisVector, MAX_AXES};
 
@@ -12,6 +13,9 @@ use crate::law::to_rest;
 /// Share of the jerk with which an axis comes to rest: a plan that brakes towards the end of its travel may use all of it, and a
 /// ramp with less would go beyond.
 const SHARE: f64 = 1.0;
+
+/// Share of the jerk limit that is seen of what counts as rounding: the one tolerance on jerk covers it.
+const ROUNDED_JERK_SHARE: f64 = 1e-3;
 
 /// A ramp to rest.
 #[derive(Clone, Copy, Debug)]
@@ -75,19 +79,42 @@ impl Ramp {
     }
 
     fn slow(&mut self, axis: usize) {
-        if self.jerk[axis].is_finite() {
-            self.slow_smoothly(axis);
+        let mut lane = Lane {
+            velocity: self.velocity[axis],
+            acceleration: self.acceleration[axis],
+            most: self.most[axis],
+            jerk: self.jerk[axis],
+        };
+        lane.slow(self.period_s);
+        (self.velocity[axis], self.acceleration[axis]) = (lane.velocity, lane.acceleration);
+    }
+}
+
+/// A coordinate by itself, and what it comes to rest with.
+#[derive(Clone, Copy, Debug)]
+struct Lane {
+    velocity: f64,
+    acceleration: f64,
+    most: f64,
+    /// Infinite where there is no jerk limit.
+    jerk: f64,
+}
+
+impl Lane {
+    /// Goes on for a period.
+    fn slow(&mut self, period_s: f64) {
+        if self.jerk.is_finite() {
+            self.slow_smoothly(period_s);
         } else {
-            let v = self.velocity[axis];
-            self.velocity[axis] = v.signum() * (v.abs() - self.most[axis] * self.period_s).max(0.0);
+            let v = self.velocity;
+            self.velocity = v.signum() * (v.abs() - self.most * period_s).max(0.0);
         }
     }
 
     /// The change of acceleration that leads to rest soonest. In samples `v ← v + T·a` follows `a ← a + T·j`: the law's
     /// form in `v − T·a`.
-    fn slow_smoothly(&mut self, axis: usize) {
-        let (period_s, limit, most) = (self.period_s, self.jerk[axis], self.most[axis]);
-        let (velocity, acceleration) = (self.velocity[axis], self.acceleration[axis]);
+    fn slow_smoothly(&mut self, period_s: f64) {
+        let (limit, velocity, acceleration) = (self.jerk, self.velocity, self.acceleration);
         let jerk = to_rest(
             velocity - period_s * acceleration,
             acceleration,
@@ -95,12 +122,12 @@ impl Ramp {
             limit,
             period_s,
         );
-        let kept = acceleration.abs().max(most);
+        let kept = acceleration.abs().max(self.most);
         let next = (acceleration + period_s * jerk).clamp(-kept, kept);
         let step = limit * period_s;
         let arrives =
             (velocity + period_s * next).abs() < 1e-3 * step * period_s && next.abs() < step;
-        (self.velocity[axis], self.acceleration[axis]) = if arrives {
+        (self.velocity, self.acceleration) = if arrives {
             (0.0, 0.0)
         } else {
             (velocity + period_s * next, next)
@@ -108,23 +135,97 @@ impl Ramp {
     }
 }
 
-/// All entries to rest by one law: first the acceleration runs out, then the velocity falls.
+/// All entries to rest together.
 #[derive(Clone, Copy, Debug)]
-struct Together {
+enum Together {
+    /// They go along one line: by the law of a single coordinate.
+    Line(Line),
+    Curve(RunOut),
+}
+
+impl Together {
+    /// From the state of `ramp`, within the limits of its first `count` entries.
+    fn new(ramp: &Ramp, count: usize) -> Self {
+        Line::new(ramp, count).map_or_else(|| Self::Curve(RunOut::new(ramp, count)), Self::Line)
+    }
+
+    /// The velocity in the next period.
+    fn next(&mut self, period_s: f64) -> AxisVector {
+        match self {
+            Self::Line(line) => line.next(period_s),
+            Self::Curve(run_out) => run_out.next(period_s),
+        }
+    }
+}
+
+/// Motion along one line with a jerk limit.
+#[derive(Clone, Copy, Debug)]
+struct Line {
+    /// The entries at a velocity of 1 of the lane.
+    direction: AxisVector,
+    lane: Lane,
+}
+
+impl Line {
+    /// That of `ramp`; `None` where velocity and acceleration are off one line by more than rounding, or without a jerk limit.
+    fn new(ramp: &Ramp, count: usize) -> Option<Self> {
+        let (velocity, change) = (ramp.velocity, ramp.acceleration * ramp.period_s);
+        let dot = |a: &AxisVector, b: &AxisVector| -> f64 { (0..count).map(|i| a[i] * b[i]).sum() };
+        // Of a motion that begins or ends the acceleration tells the direction better.
+        let direction = if dot(&velocity, &velocity) >= dot(&change, &change) {
+            velocity
+        } else {
+            change
+        };
+        let squared = dot(&direction, &direction);
+        if squared < f64::MIN_POSITIVE {
+            return None;
+        }
+        let [along, changed] = [velocity, change].map(|of| dot(&of, &direction) / squared);
+        let is_straight = (0..count).all(|i| {
+            let off = (velocity[i] - direction[i] * along).abs()
+                + (change[i] - direction[i] * changed).abs();
+            let rounding_mm = 4.0 * f64::EPSILON * ramp.position[i].abs().max(1.0);
+            let seen_mm = ROUNDED_JERK_SHARE * ramp.jerk[i] * ramp.period_s.powi(3);
+            off * ramp.period_s <= seen_mm.max(rounding_mm)
+        });
+        let least = |of: &[f64; MAX_AXES]| {
+            (0..count)
+                .map(|i| of[i] / direction[i].abs())
+                .fold(f64::INFINITY, f64::min)
+        };
+        let lane = Lane {
+            velocity: along,
+            acceleration: changed / ramp.period_s,
+            most: least(&ramp.most),
+            jerk: least(&ramp.jerk),
+        };
+        (is_straight && lane.jerk.is_finite()).then_some(Self { direction, lane })
+    }
+
+    fn next(&mut self, period_s: f64) -> AxisVector {
+        self.lane.slow(period_s);
+        self.direction * self.lane.velocity
+    }
+}
+
+/// All entries to rest by one law of time: first the acceleration runs out, then the velocity falls.
+#[derive(Clone, Copy, Debug)]
+struct RunOut {
     velocity: AxisVector,
     acceleration: AxisVector,
     /// What is left of the velocity when the acceleration has run out.
     steady: AxisVector,
     /// How long it takes to run out at the jerk limit, in periods.
     runs_out: f64,
-    /// Whole periods until then, and from then until rest.
+    /// Periods until then, and from then until rest; whole ones where there is a jerk limit.
     periods: [f64; 2],
     /// The velocity falls with `1 − 3τ² + 2τ³` where there is a jerk limit, else with `1 − τ`.
     smooth: bool,
     passed: f64,
 }
 
-impl Together {
+impl RunOut {
     /// From the state of `ramp`, within the limits of its first `count` entries.
     fn new(ramp: &Ramp, count: usize) -> Self {
         let (period_s, velocity, acceleration) = (ramp.period_s, ramp.velocity, ramp.acceleration);
@@ -142,7 +243,10 @@ impl Together {
                 v / ramp.most[i]
             }
         });
-        let fall = (fall_s / period_s).ceil().max(1.0);
+        // Without a jerk limit the last period slows by what is left: to last whole periods would go farther than a plan that
+        // brakes already.
+        let fall = fall_s / period_s;
+        let fall = if smooth { fall.ceil().max(1.0) } else { fall };
         Self {
             velocity,
             acceleration,
@@ -162,10 +266,11 @@ impl Together {
             return self.velocity
                 + self.acceleration * (gained(self.passed, self.runs_out) * period_s);
         }
-        let share = ((self.passed - out) / fall).min(1.0);
-        if share >= 1.0 {
+        let passed = self.passed - out;
+        if passed >= fall {
             return AxisVector::ZERO;
         }
+        let share = passed / fall;
         self.steady
             * if self.smooth {
                 1.0 - share * share * (3.0 - 2.0 * share)
@@ -240,7 +345,7 @@ mod tests {
         #[test]
         fn goes_no_farther_than_a_plan_that_brakes_already(
             speed in 1.0..200.0f64, most in 100.0..5000.0f64, building_s in 0.003..0.1f64, period_s in 1e-4..1e-3f64,
-            phase in 0.0..1.0f64, at in 0.0..1.0f64,
+            phase in 0.0..1.0f64, at in 0.0..1.0f64, direction in 0.0..6.3f64, together in proptest::bool::ANY,
         ) {
             let jerk = most / building_s;
             let ramp_s = building_s.min((speed / jerk).sqrt());
@@ -264,30 +369,60 @@ mod tests {
             let k = (at * samples).floor();
             let velocity = (sample(k) - sample(k - 1.0)) / period_s;
             let before = (sample(k - 1.0) - sample(k - 2.0)) / period_s;
-            let one = |x: f64| AxisVector::from_slice(&[x]);
+            // Along a line of two axes whose sum and difference are joints, or one axis by itself.
+            let (x, y) = (direction.cos(), direction.sin());
+            let shares = if together { [x, y, x + y, x - y] } else { [1.0, 0.0, 0.0, 0.0] };
+            let all = |of: f64| AxisVector::from_slice(&shares.map(|share| of * share));
+            let limits = |of: f64| std::array::from_fn(|i| of * shares.get(i).map_or(1.0, |share: &f64| share.abs().max(1e-9)));
             let mut ramp = Ramp {
-                position: one(sample(k)),
-                velocity: one(velocity),
-                acceleration: one((velocity - before) / period_s),
-                most: [most; MAX_AXES],
-                jerk: [jerk; MAX_AXES],
+                position: all(sample(k)),
+                velocity: all(velocity),
+                acceleration: all((velocity - before) / period_s),
+                most: limits(most),
+                jerk: limits(jerk),
                 period_s,
                 together: None,
-                axes: 1,
+                axes: if together { MAX_AXES } else { 1 },
             };
+            if together {
+                ramp.together = Some(Together::new(&ramp, 4));
+            }
             let (mut velocity, mut acceleration, mut last) = (ramp.velocity, ramp.acceleration, ramp.position);
             for _ in 0..100_000 {
                 if ramp.is_over() { break; }
                 last = ramp.next();
                 let next = (ramp.velocity - velocity) * (1.0 / period_s);
-                let change = (next - acceleration)[0] / period_s;
-                prop_assert!(next[0].abs() <= most * (1.0 + 1e-6), "{} of {most}", next[0]);
-                prop_assert!(change.abs() <= jerk * 1.01, "{change} of {jerk}");
+                for i in (0..4).filter(|i| shares[*i].abs() > 1e-6) {
+                    let change = (next - acceleration)[i] / period_s;
+                    prop_assert!(next[i].abs() <= ramp.most[i] * (1.0 + 1e-6), "{} of {most}", next[i]);
+                    prop_assert!(change.abs() <= ramp.jerk[i] * 1.01, "{change} of {jerk}");
+                }
                 (velocity, acceleration) = (ramp.velocity, next);
             }
             prop_assert!(ramp.is_over());
             let (end, grain) = (plan(time_s), jerk * period_s.powi(3));
-            prop_assert!(last[0] <= end + grain, "{} grains beyond", (last[0] - end) / grain);
+            let gone = (0..4).map(|i| last[i] * shares[i]).sum::<f64>() / shares.map(|share| share * share).iter().sum::<f64>();
+            prop_assert!(gone <= end + grain, "{} grains beyond", (gone - end) / grain);
+        }
+
+        /// The same without a jerk limit, where joints are sums of axes.
+        #[test]
+        fn together_no_farther_than_a_plan_that_brakes_at_the_limit(
+            speed in 0.01..200.0f64, most in 5.0..5000.0f64, period_s in 1e-4..2e-3f64, direction in 0.0..6.3f64,
+        ) {
+            let (x, y) = (direction.cos(), direction.sin());
+            let shares = [x, y, x + y, x - y];
+            let mut ramp = ramp([speed * x, speed * y], [0.0; 2], f64::INFINITY);
+            ramp.most = std::array::from_fn(|i| most * shares.get(i).map_or(1.0, |share| share.abs().max(1e-9)));
+            ramp.period_s = period_s;
+            ramp.together = Some(Together::new(&ramp, 4));
+            while !ramp.is_over() {
+                ramp.next();
+            }
+            // The velocity of the last samples is that in the middle of their period.
+            let now = (speed - most * period_s / 2.0).max(0.0);
+            let (gone, end) = (ramp.position[0] * x + ramp.position[1] * y, now * now / (2.0 * most));
+            prop_assert!(gone <= end * (1.0 + 1e-9) + 1e-12, "{gone} of {end}");
         }
     }
 }
