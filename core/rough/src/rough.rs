@@ -225,7 +225,7 @@ impl RoughLoop {
 
     fn fill(&mut self, observer: &mut dyn Observer) -> Result<(), RoughError> {
         let (period_s, advance_s) = (self.config.rough_period_s, self.config.advance_s);
-        let mut short = 0;
+        let (mut short, mut timeless) = (0, 0);
         self.gathering.pass(period_s);
         if !self.done && self.source.streams() && self.queue.is_deep(MARGIN_PERIODS * period_s) {
             // A sender has few places to wait in: its lines go to the planner as they come, not when they are needed, or the planner
@@ -271,11 +271,16 @@ impl RoughLoop {
                 self.finish();
                 continue;
             }
-            if emitted_s == 0.0 && !self.finished {
+            if emitted_s == 0.0 && !self.finished && self.last_block == last_block {
                 return Err(planner_error(
                     Some(self.line),
                     "it is full, and advance emits nothing",
                 ));
+            }
+            // Blocks that take no time, as dwells of nothing: they have made room, and the next ones are offered.
+            timeless += u32::from(emitted_s == 0.0 && !self.finished);
+            if timeless > MAX_SHORT_ADVANCES {
+                return Ok(());
             }
             // A planner may wait for the next block, which its buffer has room for.
             short += u32::from(emitted_s < advance_s / 2.0 && self.last_block == last_block);

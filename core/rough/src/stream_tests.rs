@@ -666,6 +666,42 @@ fn a_planner_that_is_full_and_emits_nothing_is_named_with_the_line() {
     );
 }
 
+/// A planner with room for two blocks that are over as soon as they begin, as dwells of nothing are.
+#[test]
+fn blocks_that_take_no_time_make_room_for_those_behind_them() {
+    #[derive(Default)]
+    struct Timeless {
+        held: u64,
+        passed: u64,
+    }
+    impl Plans for Timeless {
+        fn accept(&mut self, _block: &Block) -> Accepted {
+            if self.held == 2 {
+                return Accepted::Full;
+            }
+            self.held += 1;
+            Accepted::Accepted
+        }
+        fn advance(&mut self, duration_s: f64, sink: &mut dyn SegmentSink) -> (f64, bool) {
+            self.passed += std::mem::take(&mut self.held);
+            if self.passed < 7 {
+                return (0.0, false);
+            }
+            let mut segment = Segment::rest(&AxisVector::ZERO, duration_s);
+            segment.flags = SegmentFlags::ENDS_AT_REST;
+            sink.segment(&segment);
+            (duration_s, true)
+        }
+    }
+    let items = (0..7).map(block).chain([Item::End]).collect();
+    let script = Script::of(vec![Ok(items)]);
+    let (rough, _fine, _host) = bridge(Sizes::default());
+    let config = RoughConfig::new(ROUGH_PERIOD_S, ROUGH_PERIOD_S);
+    let planner = Box::new(Fake(Timeless::default()));
+    let mut rough = RoughLoop::new(config, Box::new(script), planner, rough);
+    assert_eq!(rough.step(&mut ()).unwrap(), Progress::Done);
+}
+
 /// Steps count of which a sample shows a thousandth of what an axis accelerates by, or 0.5 % of its jerk: on slow machines and
 /// short periods small ones.
 #[test]
