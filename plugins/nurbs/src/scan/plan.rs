@@ -10,7 +10,7 @@ use super::points::ease;
 use super::spline::fill;
 use crate::stream::check::{Look, check};
 use crate::stream::slowdown::Slowdowns;
-use crate::stream::{Bounds, Job, Planning, Window, lay_times};
+use crate::stream::{Bounds, Job, Motion as _, Planning, Window, lay_times, longest_s};
 use crate::windowed::{Ramps, Windowed};
 
 /// Share of the jerk limits that is used.
@@ -25,6 +25,9 @@ const HOPELESS: usize = 6;
 /// every limit.
 const SHORT_S: f64 = 0.15;
 const RAMPS_SHARE: f64 = 0.95;
+/// A window may take this many times as long as the ramps it began with, and as much longer as is short. What is slower than that
+/// has found next to no rate for some place: to rest, and from there on a shorter way or by ramps, is faster.
+const SLOWEST: f64 = 4.0;
 /// Longest interval of the grid, s, unless three fine periods are longer.
 const MAX_GRID_S: f64 = 5e-3;
 /// Intervals of the grid at least, and at most: a motion slower than that is planned on a coarser one.
@@ -56,7 +59,8 @@ impl Planning for Scan {
             f64::INFINITY
         };
         // A path so short and sharp that limits between samples count most.
-        let doubtful = slow_s < SHORT_S || slow_s > RAMPS_SHARE * self.begun_s;
+        let doubtful =
+            slow_s < SHORT_S || slow_s > RAMPS_SHARE * self.begun_s || slow_s > long_s(job, window);
         if job.rests() && doubtful {
             return self.plan_ramps(job, window, slow_s) || found;
         }
@@ -75,6 +79,9 @@ impl Scan {
             self.solve(job, n > 1, window);
             if n == 1 {
                 self.begun_s = self.first.end().0;
+            }
+            if self.crawls(job, window) {
+                break;
             }
             let kept_all = !self.dips(job, window)
                 && check(job, window, Look::Segments, &mut self.slowdowns).is_kept();
@@ -103,6 +110,14 @@ impl Scan {
                 && check(job, window, Look::Segments, &mut self.slowdowns).is_kept();
         }
         false
+    }
+
+    /// Whether the solution is slower than any motion is to be.
+    fn crawls(&self, job: &Job<Driven>, window: &Window<Driven>) -> bool {
+        let duration_s = window.duration_s();
+        // One without a value is for the check, which lowers the speed there.
+        duration_s.is_finite()
+            && duration_s > longest_s(job.bounds).min(SLOWEST * self.begun_s + SHORT_S)
     }
 
     /// Whether the rate falls to zero somewhere, which it may between the places of the grid: then there are more of them.
@@ -204,6 +219,17 @@ impl Scan {
         }
         whole
     }
+}
+
+/// A time that is long for the way of a window from rest, s: several times that of a line. The first timing says nothing of hairpins
+/// that are smaller than its steps.
+fn long_s(job: &Job<Driven>, window: &Window<Driven>) -> f64 {
+    let least = job.route.front().least;
+    let way_mm = window.motion.end_mm() - job.start.state.s_mm;
+    SLOWEST
+        * (way_mm / job.route.front().feed_mm_per_s.min(least.speed_mm_per_s)
+            + 2.0 * (way_mm / least.acceleration_mm_per_s2).sqrt()
+            + (32.0 * way_mm / least.jerk_mm_per_s3).cbrt())
 }
 
 /// Grid of pseudo-time, s: a quarter of the time in which an acceleration is built up.

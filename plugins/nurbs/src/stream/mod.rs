@@ -32,6 +32,8 @@ pub use window::{Window, interval, lay_times};
 
 /// Time of a window at least, s.
 const WINDOW_S: f64 = 1.0;
+/// Samples of a window at most: slower than that is no motion.
+const MAX_SAMPLES: f64 = 4e5;
 /// A state on the path.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct State {
@@ -97,6 +99,11 @@ pub trait Planning: Debug + Default {
     type Motion: Motion;
     /// Plans `job` into `window`, checked; false where no try keeps the limits.
     fn plan(&mut self, job: &Job<Self::Motion>, window: &mut Window<Self::Motion>) -> bool;
+}
+
+/// Longest time that a window may take, s.
+pub fn longest_s(bounds: &Bounds) -> f64 {
+    MAX_SAMPLES * bounds.context.fine_period_s
 }
 
 /// Time of a window, s: three stops from `speed_mm_per_s`.

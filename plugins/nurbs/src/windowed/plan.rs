@@ -9,7 +9,7 @@ use super::ramps::{Care, Rounds};
 use super::ripple::Corner;
 use crate::stream::check::{Look, check};
 use crate::stream::slowdown::Slowdowns;
-use crate::stream::{Bounds, Cursor, Job, Planning, Route, Window, lay_times, window_s};
+use crate::stream::{Bounds, Cursor, Job, Planning, Route, Window, lay_times, longest_s, window_s};
 
 /// Share of acceleration and jerk of the first try.
 const SHARE: f64 = 0.9995;
@@ -29,9 +29,6 @@ pub const CARE: Care = Care {
     over: 1e-4,
     rounds: 40,
 };
-
-/// Samples of a window at most: slower than that is no motion.
-const MAX_SAMPLES: f64 = 4e5;
 
 /// Time between places of a line at most, s.
 pub const STEP_S: f64 = 0.1;
@@ -182,10 +179,9 @@ impl Windowed {
             &mut window.times,
             window.motion.0.iter().map(|ramp| ramp.duration_s),
         );
-        let max_s = MAX_SAMPLES * job.bounds.context.fine_period_s;
         corners[0].speed_mm_per_s >= job.start.state.speed_mm_per_s
             && window.times.len() > 1
-            && window.duration_s() <= max_s
+            && window.duration_s() <= longest_s(job.bounds)
     }
 }
 
