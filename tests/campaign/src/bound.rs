@@ -1,5 +1,7 @@
 //! How long a run may take at most: crude, but of its own, so that a machine that stands still or crawls is found.
 
+use std::collections::BTreeMap;
+
 use tandem_host::{Switches, each_block};
 use tandem_machine::Machine;
 use tandem_oracle::{Axis, Joints, axis_index};
@@ -43,10 +45,46 @@ pub struct Bound<'a> {
     time_constant_s: f64,
     total_s: f64,
     dwell_s: f64,
+    sways: Sways,
+}
+
+/// What a program asks for as a whole.
+#[derive(Clone, Debug, Default)]
+pub struct Asks {
+    /// The longest time that it may take, s, without what an operator does.
+    pub time_s: f64,
+    /// How much its rotary axes turn beside the linear ones.
+    pub sways: Sways,
+}
+
+/// For each line whose rotary axes turn beside linear ones, how many times as long its way is with them, a degree counted as
+/// a millimetre, as the way that its feed counts.
+#[derive(Clone, Debug, Default)]
+pub struct Sways(BTreeMap<u32, f64>);
+
+impl Sways {
+    /// The most of the lines from `first` to `last`; at least 1.
+    pub fn most(&self, first: u32, last: u32) -> f64 {
+        let lines = first.min(last)..=first.max(last);
+        self.0
+            .range(lines)
+            .fold(1.0, |most, (_, times)| most.max(*times))
+    }
+
+    fn add(&mut self, block: &Block, moved: &[(usize, f64)], rotary: impl Fn(usize) -> bool) {
+        let turned = moved.iter().filter(|(axis, _)| rotary(*axis));
+        let squares: f64 = turned.map(|(_, by)| by * by).sum();
+        let moves_linear = moved.iter().any(|(axis, by)| !rotary(*axis) && *by > 0.0);
+        if squares > 0.0 && moves_linear {
+            let times = (1.0 + squares / (block.length_mm * block.length_mm)).sqrt();
+            let most = self.0.entry(block.line).or_insert(1.0);
+            *most = most.max(times);
+        }
+    }
 }
 
 impl<'a> Bound<'a> {
-    /// The longest time of `program`, s, without what an operator does.
+    /// What `program` asks for.
     ///
     /// # Errors
     /// The program cannot be read.
@@ -55,7 +93,7 @@ impl<'a> Bound<'a> {
         machine: &Machine,
         judging: &'a tandem_oracle::Machine,
         filter_s: f64,
-    ) -> Result<f64, String> {
+    ) -> Result<Asks, String> {
         let axes = (0..machine.axes.count()).map(|axis| {
             (
                 axis_index(machine.axes.letter(axis)).unwrap_or_default(),
@@ -69,6 +107,7 @@ impl<'a> Bound<'a> {
             time_constant_s: machine.motion.time_constant_s,
             total_s: 0.0,
             dwell_s: 0.0,
+            sways: Sways::default(),
         };
         let mut program = tandem_gcode::Program::open(program).map_err(|e| e.to_string())?;
         each_block(
@@ -80,11 +119,15 @@ impl<'a> Bound<'a> {
             },
         )
         .map_err(|e| e.to_string())?;
-        Ok(SLACK * bound.total_s
+        let time_s = SLACK * bound.total_s
             + bound.dwell_s
             + bound.settling_s()
             + MORE_S
-            + 20.0 * machine.rough_period_s)
+            + 20.0 * machine.rough_period_s;
+        Ok(Asks {
+            time_s,
+            sways: bound.sways,
+        })
     }
 
     /// Time for slowing down and speeding up once more, s: what an operator may ask for last.
@@ -115,6 +158,10 @@ impl<'a> Bound<'a> {
                 (index, if rotary { by.to_degrees() } else { by })
             })
             .collect();
+        let axes = &self.axes;
+        self.sways.add(block, &moved, |index| {
+            axes.iter().any(|(axis, rotary)| *axis == index && *rotary)
+        });
         let overhead_s =
             self.filter_s + 2.0 * self.time_constant_s / SLACK + 4.0 * self.machine.fine_period_s;
         let moving_s = match block.kind {

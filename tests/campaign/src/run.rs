@@ -9,7 +9,7 @@ use tandem_oracle::{Joints, Row, axis_index};
 use tandem_recorder::TraceCsv;
 use tandem_rings::Sample;
 
-use crate::bound::Bound;
+use crate::bound::{Bound, Sways};
 use crate::case::Case;
 use crate::verdict::{Asked, Report, judge};
 
@@ -22,7 +22,7 @@ const STILL_S: f64 = 0.2;
 pub struct Ran {
     /// Every sample, as the oracle reads them.
     pub rows: Vec<Row>,
-    /// The longest way along the path within one period, mm or deg.
+    /// The longest way along the path within one period, mm or deg, that of rotary axes beside linear ones counted too.
     pub longest_step_mm: f64,
     /// What the host says of the run; none where it was ended because it took too long.
     pub outcome: Option<Outcome>,
@@ -103,15 +103,15 @@ pub fn drive(case: &Case, folder: &Path, registry: &Registry) -> Result<Driven, 
         return Err(wrong(why.clone()));
     }
     let asked = Asked::of(case, &machine).map_err(wrong)?;
-    let bound_s = Bound::of(&program, &machine, &judging, asked.filter_s).map_err(wrong)?;
+    let asks = Bound::of(&program, &machine, &judging, asked.filter_s).map_err(wrong)?;
     let until_s = asked.last_tick as f64 * machine.fine_period_s
         + asked.stalled as f64 * machine.rough_period_s;
-    let max_samples = (((bound_s + until_s) / machine.fine_period_s) as usize).min(MAX_SAMPLES);
+    let max_samples = (((asks.time_s + until_s) / machine.fine_period_s) as usize).min(MAX_SAMPLES);
     let parsed = tandem_gcode::Program::open(&program).map_err(|e| wrong(e.to_string()))?;
     forget_most_memory();
     let prepared = Run::prepare(machine.clone(), registry, parsed, Switches::default());
     let run = prepared.map_err(|refusal| Box::new(refused(&refusal)))?;
-    let mut kept = Kept::new(&machine, max_samples);
+    let mut kept = Kept::new(&machine, max_samples, asks.sways);
     let driven = catch_unwind(AssertUnwindSafe(|| {
         run.drive(Clock::Virtual, &asked.commands, &mut kept)
     }));
@@ -158,12 +158,13 @@ struct Kept {
     rows: Vec<Row>,
     longest_step_mm: f64,
     axes: Vec<(usize, bool)>,
+    sways: Sways,
     period_s: f64,
     most: usize,
 }
 
 impl Kept {
-    fn new(machine: &Machine, most: usize) -> Self {
+    fn new(machine: &Machine, most: usize, sways: Sways) -> Self {
         let axis = |axis| {
             (
                 axis_index(machine.axes.letter(axis)).unwrap_or_default(),
@@ -175,6 +176,7 @@ impl Kept {
             rows: vec![],
             longest_step_mm: 0.0,
             axes,
+            sways,
             period_s: machine.fine_period_s,
             most,
         }
@@ -202,9 +204,13 @@ impl RunObserver for Kept {
         };
         let turns = self.axes.iter().any(|axis| axis.1) && !self.axes.iter().any(moves);
         let step = sample.feed_mm_per_s * self.period_s;
-        self.longest_step_mm =
-            self.longest_step_mm
-                .max(if turns { step.to_degrees() } else { step });
+        let before = self.rows.last().map_or(sample.line, |last| last.line);
+        let way = if turns {
+            step.to_degrees()
+        } else {
+            step * self.sways.most(before, sample.line)
+        };
+        self.longest_step_mm = self.longest_step_mm.max(way);
         self.rows.push(row);
         if self.rows.len() > self.most {
             resume_unwind(Box::new(TooLong));
