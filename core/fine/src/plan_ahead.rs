@@ -166,10 +166,20 @@ impl<'a> Ahead<'a> {
         let mut planned = PlannedSpeed::at(self.segment, self.segment.duration_s);
         let (mut left_s, mut max_feed_mm_per_s) = (ahead_s, 0.0);
         for piece in self.pieces() {
-            max_feed_mm_per_s = piece.segment.feed_mm_per_s.max(max_feed_mm_per_s);
-            planned = PlannedSpeed {
-                max_feed_mm_per_s,
-                ..PlannedSpeed::at(piece.segment, piece.from_s + left_s.min(piece.duration_s()))
+            let at = PlannedSpeed::at(piece.segment, piece.from_s + left_s.min(piece.duration_s()));
+            planned = if piece.segment.duration_s > 0.0 {
+                max_feed_mm_per_s = piece.segment.feed_mm_per_s.max(max_feed_mm_per_s);
+                PlannedSpeed {
+                    max_feed_mm_per_s,
+                    ..at
+                }
+            } else {
+                // A rest has no feed of its own: that of what is driven to it counts.
+                PlannedSpeed {
+                    speed_mm_per_s: at.speed_mm_per_s,
+                    path_mm: at.path_mm,
+                    ..planned
+                }
             };
             if left_s < piece.duration_s() {
                 break;

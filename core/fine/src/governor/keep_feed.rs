@@ -162,7 +162,7 @@ impl Governor {
             jerk_mm_per_s3: RISE_JERK_SHARE * horizon.approach_jerk_share * jerk,
             reserve_s: RISE_PERIODS * h,
         };
-        let is_below = here.sigma * from.speed <= aim.speed_mm_per_s;
+        let is_below = here.sigma * from.speed <= aim.speed_mm_per_s / FEED_SHARE;
         let mut change = most;
         for _ in 0..ROUNDS {
             let mut way = *here;

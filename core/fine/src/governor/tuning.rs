@@ -64,6 +64,10 @@ pub const BRAKING_JERK_SHARE: f64 = 0.9;
 /// decided once in a period.
 pub const BRAKING_PERIODS: f64 = 2.0;
 
+/// Order 3: fine periods at a lower feed by which it is to be reached before its place: the last of what a speed is above it is
+/// divided by three in each.
+pub const SETTLING_PERIODS: f64 = 10.0;
+
 /// Order 3: share of the path jerk that a stop at the end of a line counts on where the plan turns or changes its speed, and
 /// elsewhere.
 pub const LINE_END_JERK_SHARES: [f64; 2] = [0.6, 0.9];

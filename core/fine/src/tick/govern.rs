@@ -2,7 +2,7 @@
 
 use crate::governor::tuning::{
     ABOVE_FEED_SHARE, BEGINNING_PERIODS, BRAKING_JERK_SHARE, BRAKING_PERIODS, LONGER_MARGIN,
-    MAX_LONGER,
+    MAX_LONGER, SETTLING_PERIODS,
 };
 use tandem_rings::STOP_SHARE;
 
@@ -588,7 +588,8 @@ impl PlanFollower {
         }
         let soon_mm = BRAKING_PERIODS
             * period_s
-            * (along.speed_mm_per_s + period_s * along.acceleration_mm_per_s2.max(0.0));
+            * (along.speed_mm_per_s + period_s * along.acceleration_mm_per_s2.max(0.0))
+            + SETTLING_PERIODS * period_s * end_mm_per_s;
         let later = Along {
             speed_mm_per_s: along.speed_mm_per_s.max(end_mm_per_s),
             ..along
@@ -626,4 +627,4 @@ pub(super) fn within(allowed: f64, planned_mm_per_s: f64) -> f64 {
 }
 
 /// Relative tolerance on the feed.
-pub(super) const FEED_TOLERANCE: f64 = 1e-7;
+const FEED_TOLERANCE: f64 = 1e-7;

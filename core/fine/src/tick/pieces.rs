@@ -6,7 +6,11 @@
 
 use tandem_sdk::{Segment, SegmentFlags};
 
-use super::govern::{FEED_TOLERANCE, PlanFollower, Ratios, within};
+use super::govern::{PlanFollower, Ratios, within};
+use crate::governor::tuning::ABOVE_FEED_SHARE;
+
+/// Rounds in which the rate at the end of a piece is sought; an odd number, so that the last one is not too high.
+const PIECE_ROUNDS: usize = 3;
 
 /// How far a period has been laid out.
 #[derive(Clone, Copy, Debug)]
@@ -63,17 +67,28 @@ impl PlanFollower {
             let whole_s = piece.duration_s();
             let piece_s = whole_s.min(laid.sigma * laid.left_s);
             if piece_s > 0.0 {
-                let target = piece_target(
-                    segment,
-                    from_s,
-                    piece_s,
-                    laid.sigma,
-                    ratios,
-                    way_speed_mm_per_s,
-                );
-                let target = target
+                let target_to = |piece_s: f64| {
+                    piece_target(
+                        segment,
+                        from_s,
+                        piece_s,
+                        laid.sigma,
+                        ratios,
+                        way_speed_mm_per_s,
+                    )
                     .min(governor.rate_in_time(laid.passed_s + piece_s))
-                    .min(limit);
+                    .min(limit)
+                };
+                let mut target = target_to(piece_s);
+                // The higher the rate becomes the farther the piece goes, where the plan may be faster: rounds find it from both
+                // sides, and the last one from below.
+                for _ in 0..PIECE_ROUNDS {
+                    if target <= laid.sigma {
+                        break;
+                    }
+                    let mean = f64::midpoint(laid.sigma, target);
+                    target = target_to(whole_s.min(mean * laid.left_s));
+                }
                 points.clear();
                 points.add(
                     segment,
@@ -115,7 +130,7 @@ fn piece_target(
     let at_end = within(ratios.feed * segment.feed_mm_per_s, behind).min(of_places);
     let allowed = ratios.mean_feed * segment.feed_mm_per_s;
     let way_mm = segment.path_mm(to_s) - segment.path_mm(from_s);
-    let is_below = sigma * before <= allowed * (1.0 + FEED_TOLERANCE);
+    let is_below = sigma * before <= allowed * (1.0 + ABOVE_FEED_SHARE);
     if is_below && way_mm > 0.0 {
         at_end.min((2.0 * allowed * piece_s / way_mm - sigma).max(0.0))
     } else {
