@@ -372,9 +372,12 @@ pub struct Calibrate {
     /// Write the model
     #[arg(long, value_name = "MODEL.toml", required_unless_present = "program", value_parser = file_name)]
     pub out: Option<PathBuf>,
-    /// Fit to the times of a file instead of an experiment; docs/machining-time.md has its columns
+    /// Fit to the times of a file instead of an experiment; - is what is typed in; docs/machining-time.md has its columns
     #[arg(long, value_name = "F.csv")]
     pub from: Option<PathBuf>,
+    /// Minimum feeds of V paths that were read at the other control, for the regression
+    #[arg(long, value_name = "F.csv", requires = "from")]
+    pub corners: Option<PathBuf>,
     /// Fit to the log of a control that has driven what --program writes: the columns t_s and line of a CSV file, such as a trace
     #[arg(long, value_name = "F.csv", conflicts_with_all = ["from", "program"])]
     pub log: Option<PathBuf>,
@@ -420,6 +423,10 @@ pub enum Form {
     LookAhead,
     /// The published linear regression
     Regression,
+    /// The planner smooth with limits and tolerance of its own
+    Smooth,
+    /// The planner block-overlap with limits and tolerance of its own
+    BlockOverlap,
 }
 
 #[derive(Group)]

@@ -7,6 +7,7 @@ use std::path::Path;
 
 use tandem_estimate::diagnose::{Evidence, Fitted, LinearFit, MAX_RMS, MIN_R2, fit_all, linear};
 use tandem_estimate::experiment::{Experiment, Measured};
+use tandem_estimate::planned::{self, PlannerKind};
 use tandem_estimate::polygon::Timed;
 use tandem_estimate::{Choice, measurements, model_file};
 use tandem_host::with_stand_ins;
@@ -30,7 +31,8 @@ pub fn calibrate(options: &args::Calibrate) -> Result<u8, Box<dyn Error>> {
     let measured = measure(options, &machine)?;
     let elsewhere = options.from.is_some() || options.log.is_some();
     let tick_s = (!elsewhere).then_some(machine.fine_period_s);
-    let fits = fit_all(&measured.timed, tick_s);
+    let mut fits = fit_all(&measured.timed, tick_s);
+    fits.extend(planners(options, &machine, &measured, &fits)?);
     let evidence = Evidence::of(&measured.timed);
     print(&table(&measured, &evidence, &fits));
     match chosen(options, &measured, &evidence, &fits) {
@@ -50,6 +52,33 @@ pub fn calibrate(options: &args::Calibrate) -> Result<u8, Box<dyn Error>> {
     }
 }
 
+/// Fits of the planners here, where one is asked for or no closed form comes close.
+fn planners(
+    options: &args::Calibrate,
+    machine: &Machine,
+    measured: &Measured,
+    closed: &[Fitted],
+) -> Result<Vec<Fitted>, Box<dyn Error>> {
+    let kinds: &[PlannerKind] = match options.model {
+        Some(Form::Smooth) => &[PlannerKind::Smooth],
+        Some(Form::BlockOverlap) => &[PlannerKind::BlockOverlap],
+        None if closed.iter().all(Fitted::is_loose) => &PlannerKind::ALL,
+        _ => &[],
+    };
+    let registry = built_in::registry()?;
+    let mut fits = vec![];
+    for kind in kinds {
+        say!(
+            "fitting {}: it plans the polygons again and again",
+            kind.name()
+        );
+        let (planned, times_s) = planned::fit(machine, &registry, &measured.timed, *kind)?;
+        let choice = Choice::Planned(planned);
+        fits.push(Fitted::with_times(choice, &times_s, &measured.timed));
+    }
+    Ok(fits)
+}
+
 /// A reader that has gone away (a closed pipe) is no reason to fail.
 fn print(text: &str) {
     let _ = std::io::stdout().write_all(text.as_bytes());
@@ -64,7 +93,7 @@ fn program(path: &Path, machine: &Machine) -> Result<u8, Box<dyn Error>> {
     let (count, name) = (experiment.polygons.len(), path.display());
     print(&format!(
         "{name}: {count} polygons, an M0 before each; write what they take to a CSV file with the columns\n\
-         n,side_mm,repetitions,seconds\nand come back with --from, or with --log where the control logs times and lines\n"
+         n,side_mm,repetitions,seconds,reading_error_s\nand come back with --from, or with --log where the control logs times and lines\n"
     ));
     left_out(&experiment);
     Ok(0)
@@ -81,9 +110,11 @@ fn left_out(experiment: &Experiment) {
 
 fn measure(options: &args::Calibrate, machine: &Machine) -> Result<Measured, Box<dyn Error>> {
     if let Some(path) = &options.from {
+        let corners = options.corners.as_deref();
+        let corners = corners.map(measurements::read_corners).transpose()?;
         return Ok(Measured {
             timed: measurements::read(path)?,
-            ..Measured::default()
+            corners: corners.unwrap_or_default(),
         });
     }
     if let Some(path) = &options.log {
@@ -116,9 +147,17 @@ fn table(measured: &Measured, evidence: &Evidence, fits: &[Fitted]) -> String {
         percent(evidence.block_time_spread),
         percent(evidence.feed_spread)
     );
+    let reading = fits.first().map_or(0.0, |fit| fit.reading);
+    if reading > 0.0 {
+        let _ = writeln!(
+            text,
+            "readings may be off by {:.2} % (rms): no form can be told to be better than that",
+            percent(reading)
+        );
+    }
     let _ = writeln!(
         text,
-        "{:12} {:>10} {:>9} {:>9}  constants",
+        "{:13} {:>10} {:>9} {:>9}  constants",
         "form", "R2", "rms, %", "worst, %"
     );
     for fit in fits {
@@ -129,12 +168,20 @@ fn table(measured: &Measured, evidence: &Evidence, fits: &[Fitted]) -> String {
         let (name, r2, rms) = (fit.choice.name(), fit.feeds.r2, percent(fit.rms));
         let _ = writeln!(
             text,
-            "{name:12} {r2:10.6} {rms:9.3} {:9.3}  {}",
+            "{name:13} {r2:10.6} {rms:9.3} {:9.3}  {}",
             percent(worst),
             fit.constants()
         );
     }
     text
+}
+
+/// What a fit leaves. A planner has more constants, with which it comes a little closer to readings that are off.
+fn simple_first(fit: &Fitted) -> f64 {
+    match fit.choice {
+        Choice::Planned(_) => 1.15 * fit.rms,
+        _ => fit.rms,
+    }
 }
 
 /// What the machine is, in words.
@@ -145,6 +192,18 @@ fn kind(evidence: &Evidence, fits: &[Fitted]) -> &'static str {
     let look_ahead = fits
         .iter()
         .any(|fit| matches!(fit.choice, Choice::LookAhead(..)) && fit.is_good());
+    let closest = fits
+        .iter()
+        .min_by(|a, b| simple_first(a).total_cmp(&simple_first(b)));
+    let closest = closest.filter(|fit| fit.is_good()).map(|fit| &fit.choice);
+    if let Some(Choice::Planned(planned)) = closest {
+        return match planned.kind {
+            PlannerKind::Smooth => {
+                "a control that bounds jerk and rounds corners within a tolerance"
+            }
+            PlannerKind::BlockOverlap => "a control whose blocks overlap within a tolerance",
+        };
+    }
     if look_ahead {
         "a look-ahead control: the feed at a corner depends on the turn, not on the length of the block"
     } else {
@@ -167,12 +226,13 @@ fn chosen(
     let of_form = |fit: &&Fitted| match (form, &fit.choice) {
         (Some(Form::Overlap), choice) => matches!(choice, Choice::Overlap(_)),
         (Some(Form::LookAhead), choice) => matches!(choice, Choice::LookAhead(..)),
+        (Some(Form::Smooth | Form::BlockOverlap), choice) => matches!(choice, Choice::Planned(_)),
         _ => true,
     };
     let best = fits
         .iter()
         .filter(of_form)
-        .min_by(|a, b| a.rms.total_cmp(&b.rms))
+        .min_by(|a, b| simple_first(a).total_cmp(&simple_first(b)))
         .ok_or("there is nothing to fit")?;
     if best.is_good() {
         return Ok(best.clone());

@@ -8,6 +8,7 @@ use crate::junction::Rule;
 use crate::look_ahead::LookAhead;
 use crate::model::Model;
 use crate::overlap::{Constants, Overlap};
+use crate::planned::Planned;
 use crate::regression::{Coefficients, Regression};
 
 /// Names of the models that need no file.
@@ -27,6 +28,8 @@ pub enum Choice {
     Overlap(Constants),
     /// The published regression.
     Regression(Coefficients),
+    /// Another control as one of the planners here, on the virtual clock.
+    Planned(Planned),
 }
 
 /// The one option of the look-ahead planner that the form depends on.
@@ -66,13 +69,14 @@ impl Choice {
             Self::LookAhead(..) => "look-ahead",
             Self::Overlap(_) => "overlap",
             Self::Regression(_) => "regression",
+            Self::Planned(planned) => planned.kind.name(),
         }
     }
 
-    /// The model at rest; none for the simulation, which needs the whole machine.
+    /// The model at rest; none for what is simulated, which needs the whole machine.
     pub fn model(&self) -> Option<Box<dyn Model>> {
         match self {
-            Self::Simulate => None,
+            Self::Simulate | Self::Planned(_) => None,
             Self::LookAhead(rule, rapid) => Some(Box::new(LookAhead::new(rule.clone(), *rapid))),
             Self::Overlap(constants) => Some(Box::new(Overlap::new(*constants))),
             Self::Regression(coefficients) => Some(Box::new(Regression::new(coefficients.clone()))),

@@ -16,6 +16,11 @@ pub const MIN_R2: f64 = 0.99;
 /// Greatest root mean square of the relative residuals of the times.
 pub const MAX_RMS: f64 = 0.03;
 
+/// Residuals are within this many times what readings may be off.
+const READINGS: f64 = 1.5;
+/// Residual above which planners are tried, too.
+const LOOSE_RMS: f64 = 0.004;
+
 /// By how much the fit may be worse with blocks of whole ticks, where the control's period is known.
 const TICK_RMS: f64 = 1e-3;
 /// Share of the residual of one acceleration for all axes that accelerations of their own have to leave, to be worth a third
@@ -32,6 +37,16 @@ pub struct Corner {
     pub feed_mm_per_s: f64,
     /// Minimum feed, mm/s.
     pub min_mm_per_s: f64,
+    /// How far the reading may be off, mm/s; 0 where nothing is known of that.
+    pub reading_error_mm_per_s: f64,
+}
+
+impl Corner {
+    /// How much it counts beside one that is known to a part in a thousand.
+    fn weight(&self) -> f64 {
+        let sure = 1e-3 * self.feed_mm_per_s;
+        sure / self.reading_error_mm_per_s.max(sure)
+    }
 }
 
 /// A model fitted to measurements.
@@ -45,21 +60,28 @@ pub struct Fitted {
     pub residuals: Vec<f64>,
     /// Root of their mean square.
     pub rms: f64,
+    /// Root of the mean square of the relative reading errors; 0 where none are known.
+    pub reading: f64,
 }
 
 impl Fitted {
     /// `choice` against the times.
     pub fn new(choice: Choice, timed: &[Timed]) -> Self {
         let times = times_s(&choice, timed);
+        Self::with_times(choice, &times, timed)
+    }
+
+    /// `choice`, under which they take `times`, s, against the times.
+    pub fn with_times(choice: Choice, times: &[f64], timed: &[Timed]) -> Self {
         let feed = |t: &Timed, time_s: f64| t.mean_feed_mm_per_s() * t.time_s / time_s;
         let pairs: Vec<_> = timed
             .iter()
-            .zip(&times)
+            .zip(times)
             .map(|(t, s)| (feed(t, *s), t.mean_feed_mm_per_s()))
             .collect();
         let residuals: Vec<_> = timed
             .iter()
-            .zip(&times)
+            .zip(times)
             .map(|(t, s)| s / t.time_s - 1.0)
             .collect();
         let rms =
@@ -69,18 +91,27 @@ impl Fitted {
             feeds: Goodness::of(&pairs),
             residuals,
             rms,
+            reading: (timed.iter().map(|t| t.reading_error().powi(2)).sum::<f64>()
+                / timed.len().max(1) as f64)
+                .sqrt(),
         }
     }
 
-    /// Whether it describes the machine.
+    /// Whether it describes the machine, as far as the readings let anybody see.
     pub fn is_good(&self) -> bool {
-        self.feeds.r2 >= MIN_R2 && self.rms <= MAX_RMS
+        self.feeds.r2 >= MIN_R2 && self.rms <= MAX_RMS.max(READINGS * self.reading)
+    }
+
+    /// Whether there may be a form that is closer: what is left is more than readings are off, where that is known.
+    pub fn is_loose(&self) -> bool {
+        !self.is_good() || self.rms > LOOSE_RMS.max(READINGS * self.reading)
     }
 
     /// Its constants, in a line.
     pub fn constants(&self) -> String {
         match &self.choice {
             Choice::Simulate => String::new(),
+            Choice::Planned(planned) => planned.constants(),
             Choice::Overlap(c) => format!("time constant {:.3} ms", c.time_constant_s * 1e3),
             Choice::LookAhead(
                 Rule::Tangent {
@@ -223,7 +254,7 @@ fn ratios(choice: &Choice, timed: &[Timed]) -> Vec<f64> {
     times_s(choice, timed)
         .iter()
         .zip(timed)
-        .map(|(s, t)| (s / t.time_s).ln())
+        .map(|(s, t)| (s / t.time_s).ln() * t.weight())
         .collect()
 }
 
@@ -366,15 +397,22 @@ pub fn linear(
 
 fn long_form(coefficients: &mut Coefficients, corners: &[Corner]) -> Result<Goodness, String> {
     coefficients.long = CORRECTED_LONG;
-    let rows: Vec<_> = corners
-        .iter()
-        .map(|c| long_terms(c.turn_rad, c.feed_mm_per_s * MM_PER_MIN))
-        .collect();
+    let weighted = |c: &Corner| {
+        let terms = long_terms(c.turn_rad, c.feed_mm_per_s * MM_PER_MIN);
+        terms.map(|term| term * c.weight())
+    };
+    let rows: Vec<_> = corners.iter().map(weighted).collect();
     let feeds: Vec<_> = corners
         .iter()
         .map(|c| c.min_mm_per_s * MM_PER_MIN)
         .collect();
-    coefficients.long = least_squares(&rows, &feeds).map_err(|e| format!("equation (11): {e}"))?;
+    let targets: Vec<_> = corners
+        .iter()
+        .zip(&feeds)
+        .map(|(c, feed)| feed * c.weight())
+        .collect();
+    coefficients.long =
+        least_squares(&rows, &targets).map_err(|e| format!("equation (11): {e}"))?;
     let pair = |(c, feed): (&Corner, &f64)| {
         (
             coefficients.long_mm_per_min(c.turn_rad, c.feed_mm_per_s * MM_PER_MIN),

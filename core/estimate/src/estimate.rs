@@ -55,9 +55,13 @@ pub fn estimate(
     switches: Switches,
     choice: &Choice,
 ) -> Result<Estimate, EstimateError> {
-    match choice.model() {
-        Some(mut model) => closed(machine, program, switches, choice.name(), model.as_mut()),
-        None => simulate(machine, registry, program, switches),
+    match (choice.model(), choice) {
+        (Some(mut model), _) => closed(machine, program, switches, choice.name(), model.as_mut()),
+        (None, Choice::Planned(planned)) => {
+            let machine = planned.machine(machine);
+            simulate(&machine, registry, program, switches, choice.name())
+        }
+        (None, _) => simulate(machine, registry, program, switches, choice.name()),
     }
 }
 
@@ -91,6 +95,7 @@ fn simulate(
     registry: &Registry,
     program: Program,
     switches: Switches,
+    model: &'static str,
 ) -> Result<Estimate, EstimateError> {
     let name = program.name().to_string();
     let switches = Switches {
@@ -112,7 +117,7 @@ fn simulate(
     }
     Ok(Estimate {
         program: name,
-        model: "simulate",
+        model,
         estimated_s: summary.motion_time_s,
         tally: watch.tally,
         assumed_edges: if switches.assumes_edges {

@@ -132,6 +132,7 @@ impl Experiment {
                 polygon: *polygon,
                 feed_mm_per_s: self.feed_mm_per_s,
                 time_s: to - from,
+                reading_error_s: 0.0,
             })
         });
         let timed: Vec<_> = timed.flatten().filter(|timed| timed.time_s > 0.0).collect();
@@ -339,6 +340,7 @@ impl Watch<'_> {
             polygon: *polygon,
             feed_mm_per_s: *feed_mm_per_s,
             time_s,
+            reading_error_s: 0.0,
         });
         let corners = vees
             .iter()
@@ -348,6 +350,7 @@ impl Watch<'_> {
             turn_rad: vee.turn_rad,
             feed_mm_per_s: vee.feed_mm_per_s,
             min_mm_per_s: *least,
+            reading_error_mm_per_s: 0.0,
         };
         Measured {
             timed: timed.collect(),

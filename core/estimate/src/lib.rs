@@ -1,7 +1,8 @@
 //! How long a part program takes: models of machining time, and their calibration.
 //!
-//! Four models behind one trait: the machine's own planner on the virtual clock ([`Choice::Simulate`]), the closed forms
-//! of a look-ahead and of an overlap control, and the published regression. [`estimate`] streams a program through one.
+//! Three models behind one trait: the closed forms of a look-ahead and of an overlap control, and the published regression.
+//! Two are simulated: the machine's own planner on the virtual clock ([`Choice::Simulate`]), and another control as one of the
+//! planners here ([`planned`]). [`estimate`] streams a program through one.
 //!
 //! `core/estimate` sees blocks, not planners. `tandem_estimate::estimate` either hands every block of the first pass to
 //! a model (`Model::block`, a bounded number of blocks kept) or runs the machine on the virtual clock with an observer
@@ -24,6 +25,7 @@ pub mod measurements;
 mod model;
 pub mod model_file;
 mod overlap;
+pub mod planned;
 pub mod polygon;
 mod regression;
 mod tally;

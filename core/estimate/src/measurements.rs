@@ -1,9 +1,12 @@
-//! Times noted at a control, as CSV: `n,side_mm,repetitions,seconds`, and `feed_mm_per_min` where it was not 5000.
+//! Times noted at a control, as CSV: `n,side_mm,repetitions,seconds`, `feed_mm_per_min` where it was not 5000, and
+//! `reading_error_s` where it is known how far a reading may be off.
 
+use std::io::Read as _;
 use std::path::Path;
 
 use serde::Deserialize;
 
+use crate::diagnose::Corner;
 use crate::polygon::{FEED_MM_PER_MIN, Polygon, Timed};
 
 /// A row as it is written.
@@ -15,6 +18,7 @@ struct Row {
     repetitions: u32,
     seconds: f64,
     feed_mm_per_min: Option<f64>,
+    reading_error_s: Option<f64>,
 }
 
 /// Reads the measurements in the file at `path`. Lines that begin with # are left out.
@@ -22,9 +26,87 @@ struct Row {
 /// # Errors
 /// What cannot be read, with file, line and cause.
 pub fn read(path: &Path) -> Result<Vec<Timed>, String> {
+    let (name, bytes) = bytes(path)?;
+    parse(&name, &bytes)
+}
+
+/// What stands in the file at `path`, and what refusals call it. `-` is what is typed in.
+fn bytes(path: &Path) -> Result<(String, Vec<u8>), String> {
+    if path == Path::new("-") {
+        let mut bytes = vec![];
+        let read = std::io::stdin().read_to_end(&mut bytes);
+        return read
+            .map(|_| ("standard input".to_string(), bytes))
+            .map_err(|e| format!("standard input: {e}"));
+    }
     let name = path.display().to_string();
     let bytes = std::fs::read(path).map_err(|e| format!("{name}: {e}"))?;
-    parse(&name, &bytes)
+    Ok((name, bytes))
+}
+
+/// A minimum feed as it is written.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CornerRow {
+    turn_deg: f64,
+    feed_mm_per_min: f64,
+    min_feed_mm_per_min: f64,
+    reading_error_mm_per_min: Option<f64>,
+}
+
+impl CornerRow {
+    fn corner(&self) -> Result<Corner, String> {
+        let error = self.reading_error_mm_per_min.unwrap_or(0.0);
+        if !(0.0..=90.0).contains(&self.turn_deg) {
+            return Err(format!("turn_deg: {} is not from 0 to 90", self.turn_deg));
+        }
+        if !(self.feed_mm_per_min > 0.0 && self.feed_mm_per_min.is_finite()) {
+            return Err(format!(
+                "feed_mm_per_min: {} is not above zero",
+                self.feed_mm_per_min
+            ));
+        }
+        // A panel may read a little more than is programmed.
+        let most = 1.1 * self.feed_mm_per_min + error;
+        if !(0.0..=most).contains(&self.min_feed_mm_per_min) {
+            let read = self.min_feed_mm_per_min;
+            return Err(format!(
+                "min_feed_mm_per_min: {read} is not from 0 to the feed"
+            ));
+        }
+        if !(error >= 0.0 && error.is_finite()) {
+            return Err(format!("reading_error_mm_per_min: {error} is below zero"));
+        }
+        Ok(Corner {
+            turn_rad: self.turn_deg.to_radians(),
+            feed_mm_per_s: self.feed_mm_per_min / 60.0,
+            min_mm_per_s: self.min_feed_mm_per_min / 60.0,
+            reading_error_mm_per_s: error / 60.0,
+        })
+    }
+}
+
+/// Reads the minimum feeds of V paths in the file at `path`: `turn_deg,feed_mm_per_min,min_feed_mm_per_min` and, where it is
+/// known, `reading_error_mm_per_min`.
+///
+/// # Errors
+/// What cannot be read, with file, line and cause.
+pub fn read_corners(path: &Path) -> Result<Vec<Corner>, String> {
+    let (name, bytes) = bytes(path)?;
+    parse_corners(&name, &bytes)
+}
+
+/// Reads minimum feeds from `bytes`; `name` is for refusals.
+///
+/// # Errors
+/// What is no minimum feed, with file, line and cause.
+pub fn parse_corners(name: &str, bytes: &[u8]) -> Result<Vec<Corner>, String> {
+    let mut all = vec![];
+    each_row(name, bytes, |row: CornerRow| {
+        all.push(row.corner()?);
+        Ok(())
+    })?;
+    Ok(all)
 }
 
 /// When a line of the program moved, as a control has logged it.
@@ -42,8 +124,7 @@ pub struct LogRow {
 /// # Errors
 /// What cannot be read, with file, line and cause; times or lines that go back.
 pub fn read_log(path: &Path) -> Result<Vec<LogRow>, String> {
-    let name = path.display().to_string();
-    let bytes = std::fs::read(path).map_err(|e| format!("{name}: {e}"))?;
+    let (name, bytes) = bytes(path)?;
     parse_log(&name, &bytes)
 }
 
@@ -88,8 +169,7 @@ pub struct ProgramTime {
 /// # Errors
 /// What cannot be read, with file, line and cause.
 pub fn read_programs(path: &Path) -> Result<Vec<ProgramTime>, String> {
-    let name = path.display().to_string();
-    let bytes = std::fs::read(path).map_err(|e| format!("{name}: {e}"))?;
+    let (name, bytes) = bytes(path)?;
     let mut all = vec![];
     each_row(&name, &bytes, |row: ProgramTime| {
         let known = row.reading_error_s.is_finite() && row.reading_error_s >= 0.0;
@@ -176,6 +256,12 @@ impl Row {
                 return Err(format!("{name}: {value} is not above zero"));
             }
         }
+        let reading_error_s = self.reading_error_s.unwrap_or(0.0);
+        if !(0.0..self.seconds).contains(&reading_error_s) {
+            return Err(format!(
+                "reading_error_s: {reading_error_s} is not from 0 to the time itself"
+            ));
+        }
         if self.n < 3 || self.repetitions == 0 {
             return Err(
                 "n: a polygon has 3 corners at least, and is gone round once at least".to_string(),
@@ -197,6 +283,7 @@ impl Row {
             polygon,
             feed_mm_per_s: feed_mm_per_min / 60.0,
             time_s: self.seconds,
+            reading_error_s,
         })
     }
 }

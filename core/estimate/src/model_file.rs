@@ -10,6 +10,7 @@ use toml::Spanned;
 use crate::choice::Choice;
 use crate::junction::Rule;
 use crate::overlap::Constants;
+use crate::planned::{Planned, PlannerKind};
 use crate::regression::{Coefficients, Switch};
 
 /// The format that is written and read.
@@ -38,6 +39,9 @@ struct File {
     overlap: Option<Spanned<OverlapTable>>,
     #[serde(rename = "look-ahead")]
     look_ahead: Option<Spanned<LookAheadTable>>,
+    smooth: Option<Spanned<PlannedTable>>,
+    #[serde(rename = "block-overlap")]
+    block_overlap: Option<Spanned<PlannedTable>>,
 }
 
 #[derive(Clone, Copy, Deserialize, PartialEq, Eq)]
@@ -46,6 +50,8 @@ enum Kind {
     Regression,
     Overlap,
     LookAhead,
+    Smooth,
+    BlockOverlap,
 }
 
 #[derive(Deserialize)]
@@ -79,20 +85,30 @@ enum JunctionKind {
 #[serde(deny_unknown_fields)]
 struct LookAheadTable {
     junction: Spanned<JunctionKind>,
-    acceleration_mm_per_s2: Spanned<Accelerations>,
+    acceleration_mm_per_s2: Spanned<PerAxis>,
     allowable_speed_difference_mm_per_min: Spanned<f64>,
     tangent_feed_mm_per_min: Option<Spanned<f64>>,
+}
+
+/// Both planners: what belongs to one of them is refused in the other.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PlannedTable {
+    acceleration_mm_per_s2: Spanned<PerAxis>,
+    jerk_mm_per_s3: Option<Spanned<PerAxis>>,
+    path_tolerance_mm: Spanned<f64>,
+    time_constant_ms: Option<Spanned<f64>>,
 }
 
 /// One for all axes, or one for each in the order of the machine file; axes beyond have the least of them.
 #[derive(Deserialize)]
 #[serde(untagged)]
-enum Accelerations {
+enum PerAxis {
     All(f64),
     Each(Vec<f64>),
 }
 
-impl Accelerations {
+impl PerAxis {
     /// As many as a machine may have axes; none where there are none or too many.
     fn each(&self) -> Option<[f64; MAX_AXES]> {
         match self {
@@ -165,6 +181,21 @@ impl Source<'_> {
         value.map(|value| self.positive(key, value)).transpose()
     }
 
+    fn per_axis(
+        &self,
+        key: &str,
+        values: &Spanned<PerAxis>,
+    ) -> Result<[f64; MAX_AXES], ModelFileError> {
+        let each = values.get_ref().each();
+        let positive = |each: &[f64; MAX_AXES]| each.iter().all(|a| a.is_finite() && *a > 0.0);
+        each.filter(positive).ok_or_else(|| {
+            let cause = format!(
+                "{key}: must be a number above zero, or an array of 1 to {MAX_AXES} of them, one an axis"
+            );
+            self.refuse(Some(values.span()), cause)
+        })
+    }
+
     fn all<const N: usize>(
         &self,
         key: &str,
@@ -230,11 +261,27 @@ pub fn parse(name: &str, text: &str) -> Result<Choice, ModelFileError> {
             Kind::LookAhead,
             file.look_ahead.as_ref().map(Spanned::span),
         ),
+        (
+            "smooth",
+            Kind::Smooth,
+            file.smooth.as_ref().map(Spanned::span),
+        ),
+        (
+            "block-overlap",
+            Kind::BlockOverlap,
+            file.block_overlap.as_ref().map(Spanned::span),
+        ),
     ];
     for (key, of, span) in tables {
         if let Some(span) = span.filter(|_| of != kind) {
             return Err(source.refuse(Some(span), format!("{key}: model names another form")));
         }
+    }
+    if let (Some(rapid), Kind::Smooth | Kind::BlockOverlap) =
+        (&file.rapid_acceleration_mm_per_s2, kind)
+    {
+        let cause = "rapid_acceleration_mm_per_s2: a planner has one acceleration for all";
+        return Err(source.refuse(Some(rapid.span()), cause));
     }
     let missing = || {
         source.refuse(
@@ -259,6 +306,14 @@ pub fn parse(name: &str, text: &str) -> Result<Choice, ModelFileError> {
                 look_ahead(&source, table.get_ref())?,
                 rapid,
             ))
+        }
+        Kind::Smooth => {
+            let table = file.smooth.as_ref().ok_or_else(missing)?;
+            planned(&source, table, PlannerKind::Smooth).map(Choice::Planned)
+        }
+        Kind::BlockOverlap => {
+            let table = file.block_overlap.as_ref().ok_or_else(missing)?;
+            planned(&source, table, PlannerKind::BlockOverlap).map(Choice::Planned)
         }
     }
 }
@@ -314,17 +369,7 @@ fn overlap(
 fn look_ahead(source: &Source<'_>, table: &LookAheadTable) -> Result<Rule, ModelFileError> {
     let key = |name: &str| format!("look-ahead.{name}");
     let stated = &table.acceleration_mm_per_s2;
-    let each = stated
-        .get_ref()
-        .each()
-        .filter(|each| each.iter().all(|a| a.is_finite() && *a > 0.0))
-        .ok_or_else(|| {
-            let cause = format!(
-                "{}: must be a number above zero, or an array of 1 to {MAX_AXES} of them, one an axis",
-                key("acceleration_mm_per_s2")
-            );
-            source.refuse(Some(stated.span()), cause)
-        })?;
+    let each = source.per_axis(&key("acceleration_mm_per_s2"), stated)?;
     let a = each[0];
     let name = key("allowable_speed_difference_mm_per_min");
     let v = source.positive(&name, &table.allowable_speed_difference_mm_per_min)? / MM_PER_MIN;
@@ -352,6 +397,51 @@ fn look_ahead(source: &Source<'_>, table: &LookAheadTable) -> Result<Rule, Model
     }
 }
 
+/// A planner with its constants: of jerk and time constant the one that it knows.
+fn planned(
+    source: &Source<'_>,
+    table: &Spanned<PlannedTable>,
+    kind: PlannerKind,
+) -> Result<Planned, ModelFileError> {
+    let (span, table) = (table.span(), table.get_ref());
+    let key = |name: &str| format!("{}.{name}", kind.name());
+    let (jerk, constant) = (key("jerk_mm_per_s3"), key("time_constant_ms"));
+    let (stated_jerk, stated_constant) = (&table.jerk_mm_per_s3, &table.time_constant_ms);
+    let mut made = Planned {
+        kind,
+        acceleration_mm_per_s2: source.per_axis(
+            &key("acceleration_mm_per_s2"),
+            &table.acceleration_mm_per_s2,
+        )?,
+        jerk_mm_per_s3: [f64::INFINITY; MAX_AXES],
+        path_tolerance_mm: source.positive(&key("path_tolerance_mm"), &table.path_tolerance_mm)?,
+        time_constant_s: 0.05,
+    };
+    match (kind, stated_jerk, stated_constant) {
+        (PlannerKind::Smooth, Some(each), None) => {
+            made.jerk_mm_per_s3 = source.per_axis(&jerk, each)?;
+        }
+        (PlannerKind::BlockOverlap, None, Some(ms)) => {
+            made.time_constant_s = source.positive(&constant, ms)? / 1e3;
+        }
+        (PlannerKind::Smooth, None, _) => {
+            return Err(source.refuse(Some(span), format!("{jerk}: missing")));
+        }
+        (PlannerKind::BlockOverlap, _, None) => {
+            return Err(source.refuse(Some(span), format!("{constant}: missing")));
+        }
+        (PlannerKind::Smooth, _, Some(other)) => {
+            let cause = format!("{constant}: smooth knows no time constant");
+            return Err(source.refuse(Some(other.span()), cause));
+        }
+        (PlannerKind::BlockOverlap, Some(other), _) => {
+            let cause = format!("{jerk}: block-overlap knows no jerk");
+            return Err(source.refuse(Some(other.span()), cause));
+        }
+    }
+    Ok(made)
+}
+
 /// The model as a file; `calibrated` says in a line what it was fitted to.
 pub fn write(choice: &Choice, calibrated: &str) -> Option<String> {
     let (kind, rapid, table) = match choice {
@@ -363,6 +453,7 @@ pub fn write(choice: &Choice, calibrated: &str) -> Option<String> {
         ),
         Choice::Overlap(c) => ("overlap", c.rapid_acceleration_mm_per_s2, overlap_text(c)),
         Choice::LookAhead(rule, rapid) => ("look-ahead", *rapid, look_ahead_text(rule)),
+        Choice::Planned(planned) => (planned.kind.name(), None, planned_text(planned)),
     };
     let calibrated = toml::Value::String(calibrated.to_string());
     let rapid = rapid
@@ -371,6 +462,34 @@ pub fn write(choice: &Choice, calibrated: &str) -> Option<String> {
     Some(format!(
         "format = {FORMAT}\ncalibrated = {calibrated}\nmodel = \"{kind}\"\n{rapid}\n[{kind}]\n{table}"
     ))
+}
+
+/// Numbers of the axes: one where all are the same.
+fn per_axis_text(each: &[f64; MAX_AXES]) -> String {
+    if each.iter().all(|value| *value == each[0]) {
+        format!("{:?}", each[0])
+    } else {
+        format!("{:?}", &each[..3])
+    }
+}
+
+fn planned_text(planned: &Planned) -> String {
+    let own = match planned.kind {
+        PlannerKind::Smooth => {
+            format!(
+                "jerk_mm_per_s3 = {}",
+                per_axis_text(&planned.jerk_mm_per_s3)
+            )
+        }
+        PlannerKind::BlockOverlap => {
+            format!("time_constant_ms = {:?}", planned.time_constant_s * 1e3)
+        }
+    };
+    format!(
+        "acceleration_mm_per_s2 = {}\n{own}\npath_tolerance_mm = {:?}\n",
+        per_axis_text(&planned.acceleration_mm_per_s2),
+        planned.path_tolerance_mm
+    )
 }
 
 fn regression_text(c: &Coefficients) -> String {

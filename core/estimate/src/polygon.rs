@@ -35,7 +35,12 @@ pub struct Timed {
     pub feed_mm_per_s: f64,
     /// Time, s.
     pub time_s: f64,
+    /// How far the reading may be off, s; 0 where nothing is known of that.
+    pub reading_error_s: f64,
 }
+
+/// Relative reading error below which a time counts in full.
+const SURE: f64 = 2e-3;
 
 impl Polygon {
     /// Turn at each corner, rad.
@@ -77,6 +82,16 @@ impl Polygon {
 }
 
 impl Timed {
+    /// Relative reading error.
+    pub fn reading_error(&self) -> f64 {
+        self.reading_error_s / self.time_s
+    }
+
+    /// How much a residual counts beside those of times that are known well: less, the more the reading may be off.
+    pub fn weight(&self) -> f64 {
+        SURE / self.reading_error().max(SURE)
+    }
+
     /// Time of a block, s.
     pub fn block_s(&self) -> f64 {
         self.time_s / f64::from(self.polygon.blocks())

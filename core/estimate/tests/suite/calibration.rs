@@ -49,6 +49,7 @@ fn the_published_table_is_that_of_an_overlap_control() {
                 polygon,
                 feed_mm_per_s: 5000.0 / 60.0,
                 time_s,
+                reading_error_s: 0.0,
             }
         })
         .collect();
@@ -148,6 +149,7 @@ fn a_control_whose_axes_are_unequal_is_found_from_noisy_readings() {
                 },
                 feed_mm_per_s: 5000.0 / 60.0,
                 time_s: 1.0,
+                reading_error_s: 0.0,
             };
             let time_s = timed.under(choice.model().unwrap().as_mut());
             Timed { time_s, ..timed }

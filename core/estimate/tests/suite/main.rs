@@ -3,4 +3,5 @@
 mod calibration;
 mod common;
 mod paper;
+mod planned;
 mod tie;

@@ -1,0 +1,520 @@
+//! Another control taken for one of Tandem's planners: limits and tolerance of its own, and no closed form.
+//!
+//! A control that bounds jerk, or rounds corners within a tolerance, has no time of a block that depends on its neighbours alone. But
+//! it is near the fastest motion within its limits, and so are the planners here. So its times are those of a planner with limits
+//! that are fitted: `smooth` (acceleration, jerk and tolerance) or `block-overlap` with its defaults (time constant, acceleration,
+//! tolerance). For the fit the planner plans the polygons alone, without a loop behind it.
+
+use nalgebra::{DMatrix, DVector};
+use tandem_gcode::Program;
+use tandem_host::{Registry, Switches, each_block, planner};
+use tandem_machine::{GuardMode, JerkMode, Machine};
+use tandem_sdk::{
+    Accepted, Block, BlockKind, BlockReport, MAX_AXES, Planner, Segment, SegmentSink,
+};
+
+use crate::polygon::{Polygon, Timed};
+
+/// Blocks of a polygon before the rounds that are timed, and in those at least.
+const BEFORE_BLOCKS: u32 = 8;
+const TIMED_BLOCKS: u32 = 12;
+/// Program time that the planner is asked for at once, s, and calls without any after which it is stuck.
+const PART_S: f64 = 0.1;
+const MOST_IDLE: u32 = 4;
+/// Where the polygons lie for the fit: as far as they need.
+const ROOM_MM: f64 = 1e5;
+
+/// Which planner.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PlannerKind {
+    /// Jerk is bounded, and the path is smoothed within the tolerance.
+    Smooth,
+    /// Blocks overlap by a time constant, within tolerance and acceleration.
+    BlockOverlap,
+}
+
+impl PlannerKind {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Smooth, Self::BlockOverlap];
+
+    /// The name of the plugin, of the model, and of its table in a model file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Smooth => "smooth",
+            Self::BlockOverlap => "block-overlap",
+        }
+    }
+}
+
+/// A planner with its constants.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Planned {
+    /// Which.
+    pub kind: PlannerKind,
+    /// Acceleration of each axis in the order of the machine file, mm/s².
+    pub acceleration_mm_per_s2: [f64; MAX_AXES],
+    /// Jerk of each axis, mm/s³: `smooth`.
+    pub jerk_mm_per_s3: [f64; MAX_AXES],
+    /// Distance from the path where a program states none, mm.
+    pub path_tolerance_mm: f64,
+    /// Time constant, s: `block-overlap`.
+    pub time_constant_s: f64,
+}
+
+impl Planned {
+    /// What a machine file says of itself, for the planner `kind`: where a fit begins.
+    pub fn of(machine: &Machine, kind: PlannerKind) -> Self {
+        let axes = &machine.limits.axes;
+        Self {
+            kind,
+            acceleration_mm_per_s2: axes.map(|axis| axis.acceleration_mm_per_s2),
+            jerk_mm_per_s3: axes.map(|axis| axis.jerk_mm_per_s3),
+            path_tolerance_mm: machine.motion.path_tolerance_mm,
+            time_constant_s: machine.motion.time_constant_s,
+        }
+    }
+
+    /// `machine` with this planner and these constants; what it is driven by stays.
+    pub fn machine(&self, machine: &Machine) -> Machine {
+        let mut made = machine.clone();
+        made.planner.plugin = self.kind.name().to_string();
+        made.planner.options = String::new();
+        for (i, axis) in made.limits.axes.iter_mut().enumerate() {
+            axis.acceleration_mm_per_s2 = self.acceleration_mm_per_s2[i];
+            axis.jerk_mm_per_s3 = match self.kind {
+                PlannerKind::Smooth => self.jerk_mm_per_s3[i],
+                PlannerKind::BlockOverlap => f64::INFINITY,
+            };
+        }
+        made.motion.path_tolerance_mm = self.path_tolerance_mm;
+        made.motion.time_constant_s = self.time_constant_s;
+        made.motion.jerk = JerkMode::Limit;
+        made.guard = GuardMode::Stop;
+        made
+    }
+
+    /// Its constants, in a line.
+    pub fn constants(&self) -> String {
+        let both = |values: &[f64; MAX_AXES], unit: &str| {
+            if values[0] == values[1] {
+                format!("{:.1} {unit}", values[0])
+            } else {
+                format!(
+                    "{:.1} {unit} along X and {:.1} along Y",
+                    values[0], values[1]
+                )
+            }
+        };
+        let acceleration = both(&self.acceleration_mm_per_s2, "mm/s²");
+        let tolerance_um = 1e3 * self.path_tolerance_mm;
+        match self.kind {
+            PlannerKind::Smooth => {
+                let jerk = both(&self.jerk_mm_per_s3, "mm/s³");
+                format!("acceleration {acceleration}, jerk {jerk}, tolerance {tolerance_um:.2} µm")
+            }
+            PlannerKind::BlockOverlap => {
+                let constant_ms = 1e3 * self.time_constant_s;
+                format!(
+                    "time constant {constant_ms:.2} ms, acceleration {acceleration}, tolerance {tolerance_um:.2} µm"
+                )
+            }
+        }
+    }
+}
+
+/// The polygons as blocks, and which rounds of each are timed.
+pub struct Bench<'a> {
+    machine: Machine,
+    registry: &'a Registry,
+    blocks: Vec<Block>,
+    parts: Vec<Part>,
+}
+
+/// The blocks of one polygon: all, and those of the rounds in the middle.
+struct Part {
+    all: std::ops::Range<u64>,
+    middle: std::ops::Range<u64>,
+    /// Rounds driven here, rounds in the middle, and rounds that were timed.
+    rounds: [u32; 3],
+}
+
+impl<'a> Bench<'a> {
+    /// The polygons that were `timed`, on a machine like `machine` with room for them.
+    ///
+    /// # Errors
+    /// They are no program that the machine reads.
+    pub fn new(machine: &Machine, registry: &'a Registry, timed: &[Timed]) -> Result<Self, String> {
+        let mut machine = machine.clone();
+        for axis in &mut machine.limits.axes {
+            (axis.min_mm, axis.max_mm) = (-ROOM_MM, ROOM_MM);
+        }
+        let axis = |letter| {
+            machine
+                .axes
+                .index(letter)
+                .ok_or_else(|| format!("the polygons need an axis {letter}"))
+        };
+        let (x, y) = (axis('X')?, axis('Y')?);
+        (machine.start[x], machine.start[y]) = (0.0, 0.0);
+        let mut text = "G21 G90 G94 G17 G40 G49 G80\nG64\n".to_string();
+        let mut wanted = vec![];
+        for timed in timed {
+            let Polygon {
+                corners, rounds, ..
+            } = timed.polygon;
+            let middle = TIMED_BLOCKS.div_ceil(corners);
+            let around = (2 * BEFORE_BLOCKS).div_ceil(corners);
+            let driven = (middle + around).min(rounds);
+            let shorter = Polygon {
+                rounds: driven,
+                ..timed.polygon
+            };
+            write(&mut text, &shorter, timed.feed_mm_per_s);
+            let from = if driven == middle + around {
+                BEFORE_BLOCKS
+            } else {
+                0
+            };
+            wanted.push((corners, from, [driven, middle.min(driven), rounds]));
+        }
+        text += "M2\n";
+        let mut program =
+            Program::spool("the polygons", text.as_bytes()).map_err(|e| e.to_string())?;
+        let mut blocks = vec![];
+        let report = each_block(
+            &machine,
+            &mut program,
+            Switches::default(),
+            &mut |block, _| {
+                blocks.push(*block);
+            },
+        )
+        .map_err(|e| e.to_string())?;
+        if let Some(wrong) = report.diagnostics.first() {
+            return Err(wrong.to_string());
+        }
+        let mut lines = blocks
+            .iter()
+            .filter(|block| block.kind == BlockKind::Line)
+            .map(|block| block.index);
+        let parts = wanted.iter().map(|(corners, from, rounds)| {
+            let first = lines.next()?;
+            let count = u64::from(corners * rounds[0]);
+            lines.nth(count as usize - 2)?;
+            let middle = first + u64::from(*from);
+            Some(Part {
+                all: first..first + count,
+                middle: middle..middle + u64::from(corners * rounds[1]),
+                rounds: *rounds,
+            })
+        });
+        let parts: Option<Vec<_>> = parts.collect();
+        Ok(Self {
+            parts: parts.ok_or("the polygons are not driven as they are written")?,
+            machine,
+            registry,
+            blocks,
+        })
+    }
+
+    /// What the polygons take under `planned`, s.
+    ///
+    /// # Errors
+    /// The planner refuses, or is stuck.
+    pub fn times_s(&self, planned: &Planned) -> Result<Vec<f64>, String> {
+        let machine = planned.machine(&self.machine);
+        let mut planner = planner(&machine, self.registry).map_err(|e| e.to_string())?;
+        let taken = durations(planner.as_mut(), &self.blocks)?;
+        let sum = |range: &std::ops::Range<u64>| -> f64 {
+            let within = range.clone().filter_map(|index| taken.get(index as usize));
+            within.sum()
+        };
+        let time = |part: &Part| {
+            let [driven, middle, rounds] = part.rounds;
+            let round_s = sum(&part.middle) / f64::from(middle);
+            sum(&part.all) + f64::from(rounds - driven) * round_s
+        };
+        Ok(self.parts.iter().map(time).collect())
+    }
+}
+
+/// A polygon, from a rest to a rest.
+fn write(text: &mut String, polygon: &Polygon, feed_mm_per_s: f64) {
+    use std::fmt::Write as _;
+    let points: Vec<_> = polygon.points_mm([0.0; 2]).collect();
+    let [x, y] = points[0];
+    let _ = writeln!(
+        text,
+        "G0 X{x:.6} Y{y:.6}\nG4 P0.1\nF{:.6}",
+        feed_mm_per_s * 60.0
+    );
+    let count = polygon.blocks() as usize;
+    for [x, y] in points.iter().cycle().skip(1).take(count) {
+        let _ = writeln!(text, "G1 X{x:.6} Y{y:.6}");
+    }
+}
+
+/// What each block takes by its index, s: program time in which it is the one that moves.
+fn durations(planner: &mut dyn Planner, blocks: &[Block]) -> Result<Vec<f64>, String> {
+    let last = blocks.last().map_or(0, |block| block.index) as usize;
+    let mut taken = Taken(vec![0.0; last + 1]);
+    let (mut next, mut idle) = (0, 0);
+    loop {
+        let mut fed = false;
+        while let Some(block) = blocks.get(next) {
+            match planner.accept(block, None).map_err(|e| e.to_string())? {
+                Accepted::Accepted => (next, fed) = (next + 1, true),
+                Accepted::Full => break,
+            }
+        }
+        if fed && next == blocks.len() {
+            planner.finish();
+        }
+        let advanced = planner
+            .advance(PART_S, &mut taken)
+            .map_err(|e| e.to_string())?;
+        if advanced.done != 0 {
+            return Ok(taken.0);
+        }
+        idle = if fed || advanced.duration_s > 0.0 {
+            0
+        } else {
+            idle + 1
+        };
+        if idle > MOST_IDLE {
+            return Err("the planner does not get on".to_string());
+        }
+    }
+}
+
+/// Program time by block.
+struct Taken(Vec<f64>);
+
+impl SegmentSink for Taken {
+    fn segment(&mut self, segment: &Segment) {
+        if let Some(taken) = self.0.get_mut(segment.block as usize) {
+            *taken += segment.duration_s;
+        }
+    }
+
+    fn block(&mut self, _report: &BlockReport) {}
+}
+
+/// Widest range of a constant that a fit looks in, as a factor on both sides of where it begins.
+const WIDEST: f64 = 400.0;
+/// Steps of a fit, and the share by which a probe changes a constant. Planning on a grid makes times a little rough, so that a
+/// smaller one finds roughness.
+const MOST_STEPS: u32 = 8;
+const PROBE: f64 = 0.03;
+/// Share by which the sum of the squares is to fall for another step, and for constants of each axis to be worth their number.
+const WORTH: f64 = 1e-2;
+const WORTH_OF_AXES: f64 = 0.8;
+/// Polygons this near to their feed tell nothing of the limits.
+const AT_FEED: f64 = 0.998;
+
+/// Which constants are fitted, as logarithms.
+#[derive(Clone, Copy)]
+struct Form {
+    kind: PlannerKind,
+    /// X and Y each have their own.
+    by_axes: bool,
+}
+
+impl Form {
+    fn logs(self, planned: &Planned) -> Vec<f64> {
+        let mut all = vec![planned.path_tolerance_mm];
+        let axes = if self.by_axes { 2 } else { 1 };
+        all.extend(&planned.acceleration_mm_per_s2[..axes]);
+        match self.kind {
+            PlannerKind::Smooth => all.extend(&planned.jerk_mm_per_s3[..axes]),
+            PlannerKind::BlockOverlap => all.push(planned.time_constant_s),
+        }
+        all.iter().map(|value| value.ln()).collect()
+    }
+
+    fn planned(self, logs: &[f64]) -> Planned {
+        let mut values = logs.iter().map(|log| log.exp());
+        let mut next = || values.next().unwrap_or(1.0);
+        let path_tolerance_mm = next();
+        let mut each = || {
+            let x = next();
+            let y = if self.by_axes { next() } else { x };
+            let mut all = [x.min(y); MAX_AXES];
+            (all[0], all[1]) = (x, y);
+            all
+        };
+        let acceleration_mm_per_s2 = each();
+        let (jerk_mm_per_s3, time_constant_s) = match self.kind {
+            PlannerKind::Smooth => (each(), 0.05),
+            PlannerKind::BlockOverlap => ([f64::INFINITY; MAX_AXES], next()),
+        };
+        Planned {
+            kind: self.kind,
+            acceleration_mm_per_s2,
+            jerk_mm_per_s3,
+            path_tolerance_mm,
+            time_constant_s,
+        }
+    }
+}
+
+/// Fits the planner `kind` to the times of polygons, beginning at what the machine file says. Host; allocates.
+///
+/// # Errors
+/// The polygons cannot be planned on this machine.
+pub fn fit(
+    machine: &Machine,
+    registry: &Registry,
+    timed: &[Timed],
+    kind: PlannerKind,
+) -> Result<(Planned, Vec<f64>), String> {
+    let tells = |timed: &&Timed| timed.mean_feed_mm_per_s() < AT_FEED * timed.feed_mm_per_s;
+    let mut telling: Vec<Timed> = timed.iter().filter(tells).copied().collect();
+    if telling.len() < 6 {
+        telling = timed.to_vec();
+    }
+    let bench = Bench::new(machine, registry, &telling)?;
+    let fit = Fit {
+        bench: &bench,
+        timed: &telling,
+    };
+    let one = Form {
+        kind,
+        by_axes: false,
+    };
+    // Where to begin a third of them says as well.
+    let some: Vec<Timed> = telling.iter().step_by(3).copied().collect();
+    let few = Fit {
+        bench: &Bench::new(machine, registry, &some)?,
+        timed: &some,
+    };
+    let (alike, square) = fit.near(one, &few.start(one, &Planned::of(machine, kind)));
+    let each = Form {
+        kind,
+        by_axes: true,
+    };
+    let mut found = (alike.clone(), square);
+    // Which axis is the weaker one the polygons tell, which lie askew.
+    let starts = [0.6f64, 1.0 / 0.6].map(|factor| {
+        let mut start = alike.clone();
+        for values in [&mut start.acceleration_mm_per_s2, &mut start.jerk_mm_per_s3] {
+            (values[0], values[1]) = (values[0] * factor, values[1] / factor);
+        }
+        (fit.square(&start), start)
+    });
+    let better = starts
+        .iter()
+        .min_by(|(one, _), (other, _)| one.total_cmp(other));
+    if let Some((_, start)) = better {
+        let of_axes = fit.near(each, start);
+        if of_axes.1 < WORTH_OF_AXES.powi(2) * square {
+            found = of_axes;
+        }
+    }
+    let all = Bench::new(machine, registry, timed)?;
+    let times_s = all.times_s(&found.0)?;
+    Ok((found.0, times_s))
+}
+
+/// What is fitted to what.
+struct Fit<'a> {
+    bench: &'a Bench<'a>,
+    timed: &'a [Timed],
+}
+
+impl Fit<'_> {
+    /// Logarithms of the ratios of times, by how well each is known; none where it cannot be planned.
+    fn residuals(&self, planned: &Planned) -> Option<Vec<f64>> {
+        let times_s = self.bench.times_s(planned).ok()?;
+        let pairs = times_s.iter().zip(self.timed);
+        let residuals = pairs.map(|(s, t)| (s / t.time_s).ln() * t.weight());
+        let all: Vec<f64> = residuals.collect();
+        all.iter().all(|r| r.is_finite()).then_some(all)
+    }
+
+    fn square(&self, planned: &Planned) -> f64 {
+        let residuals = self.residuals(planned);
+        residuals.map_or(f64::INFINITY, |all| all.iter().map(|r| r * r).sum())
+    }
+
+    /// The best of some constants around those of the machine file.
+    fn start(&self, form: Form, of: &Planned) -> Planned {
+        let mut from = of.clone();
+        let a = from.acceleration_mm_per_s2[0];
+        let finite = |jerk: f64| if jerk.is_finite() { jerk } else { 20.0 * a };
+        from.jerk_mm_per_s3 = from.jerk_mm_per_s3.map(finite);
+        from.path_tolerance_mm = from.path_tolerance_mm.max(1e-4);
+        from.time_constant_s = from.time_constant_s.max(1e-3);
+        let scaled = |factors: [f64; 2]| {
+            let mut start = from.clone();
+            start.acceleration_mm_per_s2 = start.acceleration_mm_per_s2.map(|a| a * factors[0]);
+            match form.kind {
+                PlannerKind::Smooth => {
+                    start.jerk_mm_per_s3 = start.jerk_mm_per_s3.map(|j| j * factors[1]);
+                }
+                PlannerKind::BlockOverlap => start.time_constant_s *= factors[1],
+            }
+            start
+        };
+        let factors = [0.25, 1.0, 4.0];
+        let all = factors.iter().flat_map(|a| factors.map(|b| [*a, b]));
+        let tried = all.map(scaled).map(|start| (self.square(&start), start));
+        let best = tried.min_by(|(one, _), (other, _)| one.total_cmp(other));
+        best.map_or(from.clone(), |(_, start)| start)
+    }
+
+    /// The constants of `form` that fit best near `start`, and the sum of the squares that they leave: damped Gauss-Newton steps.
+    fn near(&self, form: Form, start: &Planned) -> (Planned, f64) {
+        let first = form.logs(start);
+        let mut logs = first.clone();
+        let Some(mut here) = self.residuals(&form.planned(&logs)) else {
+            return (start.clone(), f64::INFINITY);
+        };
+        let square = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>();
+        let mut damping = 1e-2;
+        'steps: for _ in 0..MOST_STEPS {
+            let mut jacobian = DMatrix::zeros(here.len(), logs.len());
+            for index in 0..logs.len() {
+                let mut moved = logs.clone();
+                moved[index] += PROBE;
+                let there = self.residuals(&form.planned(&moved)).unwrap_or_default();
+                for (row, (there, here)) in there.iter().zip(&here).enumerate() {
+                    jacobian[(row, index)] = (there - here) / PROBE;
+                }
+            }
+            let gradient = jacobian.transpose() * DVector::from_column_slice(&here);
+            let normal = jacobian.transpose() * &jacobian;
+            loop {
+                let eased = normal.diagonal().map(|d| damping * d + 1e-9);
+                let Some(step) = (&normal + DMatrix::from_diagonal(&eased))
+                    .lu()
+                    .solve(&gradient)
+                else {
+                    break 'steps;
+                };
+                let stepped = logs.iter().zip(step.iter()).zip(&first);
+                let next: Vec<f64> = stepped
+                    .map(|((log, step), first)| {
+                        let widest = WIDEST.ln();
+                        (log - step.clamp(-1.0, 1.0)).clamp(first - widest, first + widest)
+                    })
+                    .collect();
+                let there = self.residuals(&form.planned(&next));
+                let before = square(&here);
+                if let Some(there) = there.filter(|there| square(there) < before) {
+                    let after = square(&there);
+                    (logs, here, damping) = (next, there, damping / 5.0);
+                    if after > before * (1.0 - WORTH) {
+                        break 'steps;
+                    }
+                    break;
+                }
+                damping *= 6.0;
+                if damping > 1e4 {
+                    break 'steps;
+                }
+            }
+        }
+        (form.planned(&logs), square(&here))
+    }
+}

@@ -1,0 +1,277 @@
+//! Controls that bound jerk or round corners: calibrated as planners, from times that are read badly.
+
+use std::path::Path;
+
+use tandem_estimate::diagnose::{Fitted, fit_all};
+use tandem_estimate::experiment::Experiment;
+use tandem_estimate::measurements;
+use tandem_estimate::planned::{PlannerKind, fit};
+use tandem_estimate::polygon::Timed;
+use tandem_estimate::{Choice, estimate, model_file};
+use tandem_gcode::Program;
+use tandem_host::{Clock, Registry, Switches};
+use tandem_machine::Machine;
+use tandem_rig::Random;
+
+use crate::tie::registry;
+
+/// Blocks to each polygon: as many as `tandem calibrate` drives.
+const BLOCKS: u32 = 400;
+
+/// Everything, and not a part of it.
+fn every() -> bool {
+    std::env::var_os("TANDEM_EVERY").is_some()
+}
+
+fn machine(overrides: &[(&str, String)]) -> Machine {
+    let file =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-3axis.toml");
+    let pairs = overrides
+        .iter()
+        .map(|(key, value)| ((*key).to_string(), value.clone()));
+    Machine::read(&file, &pairs.collect::<Vec<_>>()).unwrap()
+}
+
+fn with_planners() -> Registry {
+    let mut registry = registry();
+    registry.register(tandem_smooth::PLUGIN).unwrap();
+    registry
+}
+
+/// A control that is not known to who calibrates it.
+struct Control {
+    name: &'static str,
+    machine: Machine,
+}
+
+fn controls(random: &mut Random) -> Vec<Control> {
+    let text = |value: f64| format!("{value:.1}");
+    let mut drawn = || {
+        let acceleration = random.length(400.0, 2500.0);
+        [
+            text(acceleration),
+            text(acceleration * random.length(8.0, 60.0)),
+        ]
+    };
+    let (first, second) = (drawn(), drawn());
+    let limits = |x: &[String; 2], y: &[String; 2]| {
+        vec![
+            ("axes.x.max_acceleration_mm_per_s2", x[0].clone()),
+            ("axes.x.max_jerk_mm_per_s3", x[1].clone()),
+            ("axes.y.max_acceleration_mm_per_s2", y[0].clone()),
+            ("axes.y.max_jerk_mm_per_s3", y[1].clone()),
+        ]
+    };
+    let smooth = |x: &[String; 2], y: &[String; 2]| {
+        let mut keys = limits(x, y);
+        keys.push(("planner.plugin", "smooth".to_string()));
+        keys.push(("motion.jerk", "limit".to_string()));
+        machine(&keys)
+    };
+    let overlap = vec![("planner.plugin", "block-overlap".to_string())];
+    let mut unequal = overlap.clone();
+    unequal.extend(limits(&first, &second));
+    vec![
+        Control {
+            name: "smooth",
+            machine: smooth(&first, &first),
+        },
+        Control {
+            name: "smooth, unequal axes",
+            machine: smooth(&first, &second),
+        },
+        Control {
+            name: "block-overlap",
+            machine: machine(&overlap),
+        },
+        Control {
+            name: "block-overlap, unequal axes",
+            machine: machine(&unequal),
+        },
+    ]
+}
+
+/// Programs that no polygon is like: name and text. They state no tolerance, so that the control's own counts.
+fn programs() -> Vec<(String, String)> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/programs");
+    let names: &[&str] = if every() {
+        &["raster", "serpentine", "spiral", "square", "two-step-arcs"]
+    } else {
+        &["serpentine", "two-step-arcs", "square"]
+    };
+    let feeds: &[u32] = if every() {
+        &[1000, 3000, 5000]
+    } else {
+        &[3000, 5000]
+    };
+    let mut all = vec![];
+    for name in names {
+        let text = std::fs::read_to_string(folder.join(format!("{name}.ngc"))).unwrap();
+        for feed in feeds {
+            let lines = text.lines().map(|line| match line {
+                line if line.starts_with("G64") => "G64".to_string(),
+                line if line.starts_with('F') => format!("F{feed}"),
+                line => line.to_string(),
+            });
+            let text: String = lines.map(|line| line + "\n").collect();
+            all.push((format!("{name} F{feed}"), text));
+        }
+    }
+    all
+}
+
+fn takes_s(machine: &Machine, registry: &Registry, text: &str, choice: &Choice) -> f64 {
+    let program = Program::spool("fresh", text.as_bytes()).unwrap();
+    let found = estimate(machine, registry, program, Switches::default(), choice);
+    found.unwrap().estimated_s
+}
+
+/// A fit plans for a minute: `TANDEM_FITS=1 cargo test -p tandem-estimate --test suite planned -- --nocapture` drives one control,
+/// another in each run, `TANDEM_EVERY=1` all of them.
+#[test]
+fn a_control_that_bounds_jerk_is_found_from_noisy_readings() {
+    if !every() && std::env::var_os("TANDEM_FITS").is_none() {
+        return;
+    }
+    let (mut random, registry) = (Random::from_the_clock(), with_planners());
+    let mut controls = controls(&mut random);
+    if !every() {
+        // One of them, another in each run.
+        let one = random.below(controls.len() as u64) as usize;
+        controls = vec![controls.swap_remove(one)];
+    }
+    for Control {
+        name,
+        machine: real,
+    } in &controls
+    {
+        for noise in if every() {
+            vec![0.005, 0.02]
+        } else {
+            vec![0.01]
+        } {
+            let mut experiment = Experiment::new(real, BLOCKS).unwrap();
+            if !every() {
+                experiment
+                    .polygons
+                    .retain(|p| p.corners <= 36 && p.side_mm <= 2.0);
+            }
+            let measured = experiment.run(real, &registry, Clock::Virtual).unwrap();
+            let read = |timed: &Timed| Timed {
+                time_s: timed.time_s * (1.0 + noise * random.between(-1.0, 1.0)),
+                ..*timed
+            };
+            let timed: Vec<_> = measured.timed.iter().map(read).collect();
+            let closed = fit_all(&timed, None);
+            assert!(closed.iter().all(Fitted::is_loose), "{name}: {closed:?}");
+            // Who calibrates has a machine file with other limits.
+            let own = machine(&[]);
+            let fits = PlannerKind::ALL.map(|kind| {
+                let (planned, times_s) = fit(&own, &registry, &timed, kind).unwrap();
+                Fitted::with_times(Choice::Planned(planned), &times_s, &timed)
+            });
+            for fitted in &fits {
+                println!(
+                    "{name}, {noise}: rms {:.4}, {}",
+                    fitted.rms,
+                    fitted.constants()
+                );
+            }
+            let best = fits
+                .into_iter()
+                .min_by(|a, b| a.rms.total_cmp(&b.rms))
+                .unwrap();
+            assert!(best.is_good(), "{name}: {best:?}");
+            // As it is written and read again.
+            let text = model_file::write(&best.choice, "here").unwrap();
+            let choice = model_file::parse("model.toml", &text).unwrap();
+            assert_eq!(choice, best.choice, "{text}");
+            let mut errors = vec![];
+            for (program, text) in programs() {
+                let real_s = takes_s(real, &registry, &text, &Choice::Simulate);
+                let found_s = takes_s(&own, &registry, &text, &choice);
+                let error = found_s / real_s - 1.0;
+                println!(
+                    "| {name} | {noise} | {program} | {real_s:.3} | {:+.2} |",
+                    100.0 * error
+                );
+                errors.push(error.abs());
+            }
+            errors.sort_by(f64::total_cmp);
+            let (median, worst) = (errors[errors.len() / 2], errors[errors.len() - 1]);
+            println!("{name}, {noise}: median {median:.4}, worst {worst:.4}");
+            assert!(median <= 0.01 && worst <= 0.02, "{name}: {median} {worst}");
+        }
+    }
+}
+
+#[test]
+fn readings_say_how_far_they_may_be_off() {
+    let text = "n,side_mm,repetitions,seconds,reading_error_s\n3,0.1,10,1,0.1\n4,0.1,10,1,\n5,0.1,10,1,0.001\n\
+                6,0.1,10,1,0.1\n8,0.1,10,1,0.1\n9,0.1,10,1,0.1\n";
+    let timed = measurements::parse("readings.csv", text.as_bytes()).unwrap();
+    assert_eq!(
+        (timed[0].reading_error_s, timed[1].reading_error_s),
+        (0.1, 0.0)
+    );
+    assert_eq!(
+        (timed[0].weight(), timed[1].weight(), timed[2].weight()),
+        (0.02, 1.0, 1.0)
+    );
+    let wrong = text.replacen("0.1,10,1,0.1", "0.1,10,1,2", 1);
+    let refused = measurements::parse("readings.csv", wrong.as_bytes()).unwrap_err();
+    assert!(
+        refused.starts_with("readings.csv:2: reading_error_s: 2"),
+        "{refused}"
+    );
+    let rows =
+        "turn_deg,feed_mm_per_min,min_feed_mm_per_min,reading_error_mm_per_min\n60,2000,1755,20\n";
+    let corner = measurements::parse_corners("corners.csv", rows.as_bytes()).unwrap()[0];
+    assert!((corner.min_mm_per_s - 29.25).abs() < 1e-12);
+    assert!((corner.reading_error_mm_per_s * 60.0 - 20.0).abs() < 1e-12);
+    let refused = measurements::parse_corners("c.csv", rows.replace("1755", "2755").as_bytes());
+    assert!(
+        refused
+            .unwrap_err()
+            .starts_with("c.csv:2: min_feed_mm_per_min: 2755")
+    );
+}
+
+#[test]
+fn a_model_file_of_a_planner_is_read_key_by_key() {
+    let good = "format = 1\nmodel = \"smooth\"\n[smooth]\nacceleration_mm_per_s2 = [300, 900, 500]\n\
+                jerk_mm_per_s3 = 1e4\npath_tolerance_mm = 0.01\n";
+    let Ok(Choice::Planned(planned)) = model_file::parse("m.toml", good) else {
+        panic!("refused")
+    };
+    assert_eq!(
+        planned.acceleration_mm_per_s2[..4],
+        [300.0, 900.0, 500.0, 300.0]
+    );
+    for (from, to, words) in [
+        (
+            "jerk_mm_per_s3 = 1e4",
+            "time_constant_ms = 3",
+            "smooth.jerk_mm_per_s3: missing",
+        ),
+        ("jerk_mm_per_s3 = 1e4", "jerk_mm_per_s3 = 0", "m.toml:5:"),
+        (
+            "path_tolerance_mm = 0.01",
+            "path_tolerance_mm = -1",
+            "is not above zero",
+        ),
+        (
+            "[smooth]",
+            "rapid_acceleration_mm_per_s2 = 5\n[smooth]",
+            "one acceleration for all",
+        ),
+        (
+            "model = \"smooth\"",
+            "model = \"block-overlap\"",
+            "names another form",
+        ),
+    ] {
+        let refused = model_file::parse("m.toml", &good.replace(from, to)).unwrap_err();
+        assert!(refused.to_string().contains(words), "{refused}");
+    }
+}
