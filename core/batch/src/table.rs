@@ -147,10 +147,13 @@ impl Table {
         let mut database = Connection::open(path).map_err(words)?;
         let text = self.columns.len() - self.numbers;
         let column = |(index, name): (usize, &String)| {
-            let kind = if index < text && name != "builds_differ" {
+            let kind = if index >= text || name == "builds_differ" {
+                "REAL"
+            } else if index < FIRST.len() {
                 "TEXT"
             } else {
-                "REAL"
+                // What varies: numbers are compared as numbers, and words stay words.
+                "NUMERIC"
             };
             format!("\"{}\" {kind}", name.replace('"', "\"\""))
         };
