@@ -20,12 +20,15 @@ use std::path::{Path, PathBuf};
 
 pub use damage::Damage;
 
+/// Judges one input, and panics where a promise is broken.
+pub type Judge = fn(&[u8]);
+
 /// A reader, and the folders of sound examples that it begins from.
 pub struct Reader {
     /// Its name in `tests/fuzz/readers`.
     pub name: &'static str,
-    /// Judges one input, and panics where a promise is broken.
-    pub judge: fn(&[u8]),
+    /// Its judge.
+    pub judge: Judge,
     /// Folders of examples.
     pub examples: Vec<PathBuf>,
     /// Words that are worth to be tried, one a line as in a dictionary of libFuzzer.
@@ -56,8 +59,8 @@ pub fn readers() -> Vec<Reader> {
         .collect()
 }
 
-fn judge(name: &str) -> (&'static str, fn(&[u8])) {
-    const JUDGES: [(&str, fn(&[u8])); 9] = [
+fn judge(name: &str) -> (&'static str, Judge) {
+    const JUDGES: [(&str, Judge); 9] = [
         ("calibration", calibration::judge),
         ("command_file", command_file::judge),
         ("ethercat_frame", ethercat_frame::judge),

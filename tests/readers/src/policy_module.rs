@@ -64,7 +64,7 @@ impl Reencode for WithLayout {
         self.next += 1;
         if self.next - 1 == self.locate {
             let mut located = Function::new([]);
-            located.instructions().i32_const(LAYOUT as i32).end();
+            located.instructions().i32_const(LAYOUT.cast_signed()).end();
             code.function(&located);
             return Ok(());
         }
@@ -81,7 +81,7 @@ impl Reencode for WithLayout {
         section: wasmparser::DataSectionReader<'_>,
     ) -> Result<(), reencode::Error<Self::Error>> {
         reencode::utils::parse_data_section(self, data, section)?;
-        data.active(0, &ConstExpr::i32_const(LAYOUT as i32), layout());
+        data.active(0, &ConstExpr::i32_const(LAYOUT.cast_signed()), layout());
         Ok(())
     }
 }
