@@ -292,6 +292,84 @@ fn workers_that_are_killed_lose_nothing_and_record_nothing_twice() {
     );
 }
 
+/// What `script` prints when Python runs it with `arguments`; none where it cannot import what it needs.
+fn python(script: &str, arguments: &[&str]) -> Option<String> {
+    let mut command = Command::new("python3");
+    let output = command.args(["-c", script]).args(arguments).output();
+    let output = output.ok()?;
+    let said = text(&output.stderr);
+    if said.contains("ModuleNotFoundError") {
+        return None;
+    }
+    assert!(output.status.success(), "{said}");
+    Some(text(&output.stdout))
+}
+
+/// The query of docs/batch.md, as DuckDB answers it, and a like one of SQLite, beside what the rows say.
+#[test]
+fn duckdb_and_sqlite_read_the_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let own = folder.path().join("own");
+    let (machine, corners) = (machine(), program("corners"));
+    let submitted = tandem(&[
+        "batch",
+        "submit",
+        own.to_str().unwrap(),
+        "--machine",
+        machine.to_str().unwrap(),
+        "--programs",
+        &corners,
+        "--vary",
+        "motion.path_tolerance_mm=0.005,0.0125,0.02",
+        "--local",
+    ]);
+    assert!(submitted.status.success(), "{}", text(&submitted.stderr));
+    let (csv, sqlite) = (own.join("results.csv"), own.join("results.sqlite"));
+    let collected = tandem(&[
+        "batch",
+        "collect",
+        own.to_str().unwrap(),
+        "--sqlite",
+        sqlite.to_str().unwrap(),
+    ]);
+    assert!(collected.status.success(), "{}", text(&collected.stderr));
+    let rows = rows(&csv);
+    let number = |row: &BTreeMap<String, String>, key: &str| row[key].parse::<f64>().unwrap();
+    let kept = rows
+        .iter()
+        .filter(|row| number(row, "max_path_deviation_mm") <= 0.015);
+    let (time_s, tolerance_mm) = kept
+        .map(|row| {
+            (
+                number(row, "motion_time_s"),
+                number(row, "motion.path_tolerance_mm"),
+            )
+        })
+        .reduce(|a, b| if b.0 < a.0 { b } else { a })
+        .expect("a setting keeps the limit");
+    // Else the limit would decide nothing.
+    assert_eq!((rows.len(), tolerance_mm), (3, 0.0125));
+    let page = fs::read_to_string(root().join("docs/batch.md")).unwrap();
+    let (_, query) = page.split_once("```sql\n").unwrap();
+    let (query, _) = query.split_once("```").unwrap();
+    assert!(query.contains("'target/shop/results.csv'"));
+    let query = query.replace("target/shop/results.csv", csv.to_str().unwrap());
+    let answers = "import duckdb, sys\nfor row in duckdb.sql(sys.argv[1]).fetchall(): print(*row)";
+    match python(answers, &[&query]) {
+        Some(answer) => assert_eq!(answer, format!("{corners} {tolerance_mm:?} {time_s:?}\n")),
+        None => println!("skipped: python3 has no duckdb"),
+    }
+    // What varied is compared as a number there, too.
+    let query = "SELECT min(motion_time_s), typeof(\"motion.path_tolerance_mm\") FROM results \
+                 WHERE ended = 'done' AND \"motion.path_tolerance_mm\" < 0.0126";
+    let answers = "import sqlite3, sys\n\
+                   for row in sqlite3.connect(sys.argv[1]).execute(sys.argv[2]): print(*row)";
+    match python(answers, &[sqlite.to_str().unwrap(), query]) {
+        Some(answer) => assert_eq!(answer, format!("{time_s:?} real\n")),
+        None => println!("skipped: there is no python3 with sqlite3"),
+    }
+}
+
 #[test]
 fn another_build_that_gives_other_results_is_told() {
     let folder = tempfile::tempdir().unwrap();
