@@ -7,6 +7,7 @@ use crate::plan::INTERVALS;
 use crate::route::{Chord, Run};
 use crate::timing::Mark;
 use crate::travel::Travel;
+use crate::verify::larger;
 
 /// Share of the tolerance that boxes use.
 pub const BOX_SHARE: f64 = 0.955;
@@ -56,10 +57,26 @@ pub struct Candidate<const L: usize> {
     half: Option<Lanes<L>>,
 }
 
+/// What a vertex is to the boxes around it.
+#[derive(Clone, Copy, Debug)]
+struct Vertex<const L: usize> {
+    s: f64,
+    /// How much every lane turns.
+    turns: Lanes<L>,
+    /// How much the path bends, 1/mm.
+    bend: f64,
+    /// The motion is to pass it in its time, and how far it may be off then, mm.
+    marked: bool,
+    timely: f64,
+}
+
 /// Waypoints of a window; keeps its memory.
 #[derive(Debug)]
 pub struct Waypoints<const L: usize> {
     candidates: Vec<Candidate<L>>,
+    /// Vertices in and around the window, of which each is looked at for many boxes; and the first one's chord.
+    vertices: Vec<Vertex<L>>,
+    first: usize,
     /// The waypoints chosen, with their path coordinates and chords.
     pub chosen: Vec<Waypoint<L>>,
     pub along: Vec<(f64, u32)>,
@@ -69,6 +86,8 @@ impl<const L: usize> Default for Waypoints<L> {
     fn default() -> Self {
         Self {
             candidates: Vec::new(),
+            vertices: Vec::new(),
+            first: 0,
             chosen: Vec::new(),
             along: Vec::new(),
         }
@@ -105,6 +124,11 @@ impl<const L: usize> Waypoints<L> {
     pub fn gather(&mut self, run: &Run<'_, L>, from: f64, to: f64) {
         self.candidates.clear();
         let mut i = run.chord_at(from, 0);
+        let last = run.chord_at(to, i);
+        self.first = i.saturating_sub(LOOKS).max(1);
+        self.vertices.clear();
+        let around = self.first..(last + 1 + LOOKS).min(run.chords.len());
+        self.vertices.extend(around.map(|v| vertex(run.chords, v)));
         while i < run.chords.len() && run.chords[i].s < to {
             let chord = &run.chords[i];
             let turn = run
@@ -155,7 +179,7 @@ impl<const L: usize> Waypoints<L> {
             if t > 0.4 * h && t < end_s {
                 let half = candidate
                     .half
-                    .unwrap_or_else(|| half_widths(run, &candidate, grid));
+                    .unwrap_or_else(|| self.half_widths(run, &candidate, grid));
                 self.candidates[n].half = Some(half);
                 self.add(run, t, &candidate, &half, grid, keep);
             }
@@ -200,7 +224,7 @@ impl<const L: usize> Waypoints<L> {
                 firm: false,
                 half: None,
             };
-            let half = half_widths(run, &candidate, grid);
+            let half = self.half_widths(run, &candidate, grid);
             self.add(run, time, &candidate, &half, grid, keep);
         }
     }
@@ -238,6 +262,92 @@ impl<const L: usize> Waypoints<L> {
         });
         self.along.push((candidate.s, candidate.chord));
     }
+
+    /// Half widths of the box at a place: all corners of the box stand off the path by no more than the tolerance, and the axes
+    /// that turn get most of it. Along the path the box may be longer.
+    fn half_widths(&self, run: &Run<'_, L>, candidate: &Candidate<L>, grid: Grid) -> Lanes<L> {
+        let chords = run.chords;
+        let i = candidate.chord as usize;
+        let s = candidate.s;
+        let lanes = grid.lanes;
+        let before = if candidate.vertex && i > 0 {
+            &chords[i - 1]
+        } else {
+            &chords[i]
+        };
+        let swing = chords[i].speed.max(before.speed)
+            * (chords[i].turn_s.max(before.turn_s) + SWING_STEPS * grid.step_s);
+        let tolerance = chords[i].tolerance.min(before.tolerance).min(swing);
+        let Needs {
+            mut need,
+            sharp_way,
+            timely,
+            bend,
+        } = self.needs(run, i, s);
+        let most = largest(&need);
+        if most > 0.0 {
+            need = each(|l| (need[l] + 0.08 * most) / (1.08 * most));
+        } else {
+            need = [1.0; L];
+        }
+        // Lanes without an axis take nothing of the tolerance.
+        need[lanes..].fill(0.0);
+        let widen = |half: Lanes<L>, along: Lanes<L>| {
+            each(|l| {
+                if half[l] > 0.0 {
+                    half[l].min(timely / along[l].abs().max(1e-9))
+                } else {
+                    tolerance
+                }
+            })
+        };
+        let Some(tangent) = tangent(run, candidate) else {
+            // Round a sharp vertex the motion may be anywhere in a disc.
+            let size = dot(&need, &need).sqrt();
+            return widen(each(|l| need[l] * (BOX_SHARE * tolerance / size)), [1.0; L]);
+        };
+        let straight = (BENT * tolerance / bend.max(1e-12)).sqrt().min(LOOSE_MM);
+        let loose = (0.5 * sharp_way / tolerance).clamp(1.0, (straight / tolerance).max(10.0));
+        for l in 0..lanes {
+            let t = tangent[l].abs();
+            let across = (1.0 - t * t).max(1e-6).sqrt();
+            need[l] = need[l].max(t * (0.3 / across).min(loose));
+        }
+        let worst = farthest(&need, &tangent);
+        widen(
+            each(|l| {
+                (need[l] * (BOX_SHARE / worst)).min(LONGEST.max(LONGEST_MM / tolerance)) * tolerance
+            })
+            .map(|half| half.min(LONGEST_SWING * swing)),
+            tangent,
+        )
+    }
+
+    /// What lies around `s` on chord `i`.
+    fn needs(&self, run: &Run<'_, L>, i: usize, s: f64) -> Needs<L> {
+        let mut needs = Needs {
+            need: [0.0; L],
+            sharp_way: run.end() - s,
+            timely: f64::INFINITY,
+            bend: 0.0,
+        };
+        // A chord behind a rest, or a turn back, has no turn.
+        let here = (i + 1).saturating_sub(self.first).min(self.vertices.len());
+        let (behind, ahead) = self.vertices.split_at(here);
+        for vertex in behind.iter().rev().take(LOOKS) {
+            if s - vertex.s > NEAR {
+                break;
+            }
+            needs.look(vertex, s);
+        }
+        for vertex in ahead.iter().take(LOOKS) {
+            if vertex.s - s > NEAR {
+                break;
+            }
+            needs.look(vertex, s);
+        }
+        needs
+    }
 }
 
 /// Time along marks, asked for in order.
@@ -262,66 +372,6 @@ impl Timer<'_> {
             b.t
         }
     }
-}
-
-/// Half widths of the box at a place: all corners of the box stand off the path by no more than the tolerance, and the axes
-/// that turn get most of it. Along the path the box may be longer.
-fn half_widths<const L: usize>(run: &Run<'_, L>, candidate: &Candidate<L>, grid: Grid) -> Lanes<L> {
-    let chords = run.chords;
-    let i = candidate.chord as usize;
-    let s = candidate.s;
-    let lanes = grid.lanes;
-    let before = if candidate.vertex && i > 0 {
-        &chords[i - 1]
-    } else {
-        &chords[i]
-    };
-    let swing = chords[i].speed.max(before.speed)
-        * (chords[i].turn_s.max(before.turn_s) + SWING_STEPS * grid.step_s);
-    let tolerance = chords[i].tolerance.min(before.tolerance).min(swing);
-    let Needs {
-        mut need,
-        sharp_way,
-        timely,
-        bend,
-    } = needs(run, i, s);
-    let most = largest(&need);
-    if most > 0.0 {
-        need = each(|l| (need[l] + 0.08 * most) / (1.08 * most));
-    } else {
-        need = [1.0; L];
-    }
-    // Lanes without an axis take nothing of the tolerance.
-    need[lanes..].fill(0.0);
-    let widen = |half: Lanes<L>, along: Lanes<L>| {
-        each(|l| {
-            if half[l] > 0.0 {
-                half[l].min(timely / along[l].abs().max(1e-9))
-            } else {
-                tolerance
-            }
-        })
-    };
-    let Some(tangent) = tangent(run, candidate) else {
-        // Round a sharp vertex the motion may be anywhere in a disc.
-        let size = dot(&need, &need).sqrt();
-        return widen(each(|l| need[l] * (BOX_SHARE * tolerance / size)), [1.0; L]);
-    };
-    let straight = (BENT * tolerance / bend.max(1e-12)).sqrt().min(LOOSE_MM);
-    let loose = (0.5 * sharp_way / tolerance).clamp(1.0, (straight / tolerance).max(10.0));
-    for l in 0..lanes {
-        let t = tangent[l].abs();
-        let across = (1.0 - t * t).max(1e-6).sqrt();
-        need[l] = need[l].max(t * (0.3 / across).min(loose));
-    }
-    let worst = farthest(&need, &tangent);
-    widen(
-        each(|l| {
-            (need[l] * (BOX_SHARE / worst)).min(LONGEST.max(LONGEST_MM / tolerance)) * tolerance
-        })
-        .map(|half| half.min(LONGEST_SWING * swing)),
-        tangent,
-    )
 }
 
 /// Whether the motion is to pass vertex `v` in its time: a sharp turn, or another feed.
@@ -353,46 +403,31 @@ struct Needs<const L: usize> {
     bend: f64,
 }
 
-/// What lies around `s`.
-fn needs<const L: usize>(run: &Run<'_, L>, i: usize, s: f64) -> Needs<L> {
-    let chords = run.chords;
-    let mut need = [0.0; L];
-    let mut sharp_way = f64::INFINITY;
-    let mut in_time = f64::INFINITY;
-    let mut bend = 0.0f64;
-    let mut look = |v: usize| {
-        let turn = minus(&chords[v].direction, &chords[v - 1].direction);
-        for l in 0..L {
-            need[l] = f64::max(need[l], turn[l].abs());
+impl<const L: usize> Needs<L> {
+    #[inline(always)]
+    fn look(&mut self, vertex: &Vertex<L>, s: f64) {
+        let need = &self.need;
+        self.need = each(|l| larger(need[l], vertex.turns[l]));
+        self.bend = larger(self.bend, vertex.bend);
+        if vertex.marked {
+            let way = (s - vertex.s).abs();
+            self.sharp_way = self.sharp_way.min(way);
+            self.timely = self.timely.min(vertex.timely + way / 2.0);
         }
-        let length = f64::midpoint(chords[v].length, chords[v - 1].length);
-        bend = bend.max(chords[v].turn / length);
-        if is_marked(chords, v) {
-            let way = (s - chords[v].s).abs();
-            sharp_way = sharp_way.min(way);
-            in_time = in_time.min(timely(chords, v) + way / 2.0);
-        }
-    };
-    // A chord behind a rest, or a turn back, has no turn.
-    let mut v = i;
-    for _ in 0..LOOKS {
-        if v == 0 || s - chords[v].s > NEAR {
-            break;
-        }
-        look(v);
-        v -= 1;
     }
-    for v in i + 1..(i + 1 + LOOKS).min(chords.len()) {
-        if chords[v].s - s > NEAR {
-            break;
-        }
-        look(v);
-    }
-    Needs {
-        need,
-        sharp_way: sharp_way.min(run.end() - s),
-        timely: in_time,
-        bend,
+}
+
+/// The vertex at the start of chord `v`, which has one before it.
+fn vertex<const L: usize>(chords: &[Chord<L>], v: usize) -> Vertex<L> {
+    let turn = minus(&chords[v].direction, &chords[v - 1].direction);
+    let length = f64::midpoint(chords[v].length, chords[v - 1].length);
+    let timely = timely(chords, v);
+    Vertex {
+        s: chords[v].s,
+        turns: turn.map(f64::abs),
+        bend: chords[v].turn / length,
+        marked: chords[v].turn > SHARP || timely.is_finite(),
+        timely,
     }
 }
 
