@@ -1,5 +1,7 @@
 //! A planned window: quintics over time, from a state to rest.
 
+use std::cell::Cell;
+
 use tandem_motion::hermite;
 use tandem_motion::tube::{Lanes, each};
 
@@ -102,7 +104,12 @@ pub struct Window<const L: usize> {
     pub whole: bool,
     /// What it leaves for a stop.
     pub stop: Stop,
+    /// Where marks were last looked for: the next question is about a place near it.
+    near: Cell<usize>,
 }
+
+/// Marks that are looked at beside the last ones before all are searched.
+const NEAR: usize = 8;
 
 /// What a window leaves for a stop, as path speed counts.
 #[derive(Clone, Copy, Debug)]
@@ -145,7 +152,29 @@ impl<const L: usize> Window<L> {
             marks: Vec::with_capacity(MAX_MARKS),
             whole: false,
             stop: Stop::default(),
+            near: Cell::new(0),
         }
+    }
+
+    /// How many marks are `before` a place, from the first one on.
+    fn marks_before(&self, before: impl Fn(&Mark) -> bool) -> usize {
+        let marks = &self.marks;
+        let near = self.near.get().min(marks.len());
+        let last = (near + NEAR).min(marks.len());
+        let mut count = near;
+        while count < last && before(&marks[count]) {
+            count += 1;
+        }
+        let first = near.saturating_sub(NEAR);
+        while count > first && !before(&marks[count - 1]) {
+            count -= 1;
+        }
+        let ends = (count == last && count < marks.len()) || (count == first && count > 0);
+        if ends {
+            count = marks.partition_point(before);
+        }
+        self.near.set(count);
+        count
     }
 
     /// How long it takes to its end.
@@ -169,7 +198,7 @@ impl<const L: usize> Window<L> {
 
     /// When the motion passes `s`.
     pub fn time_of(&self, s: f64) -> f64 {
-        let at = self.marks.partition_point(|mark| mark.s <= s).max(1) - 1;
+        let at = self.marks_before(|mark| mark.s <= s).max(1) - 1;
         Timer {
             marks: &self.marks,
             at: at.min(self.marks.len().saturating_sub(2)),
@@ -180,8 +209,7 @@ impl<const L: usize> Window<L> {
     /// Path coordinate at `t`.
     pub fn along(&self, t: f64) -> f64 {
         let at = self
-            .marks
-            .partition_point(|mark| mark.t <= t)
+            .marks_before(|mark| mark.t <= t)
             .clamp(1, self.marks.len() - 1);
         let a = self.marks[at - 1];
         let b = self.marks[at];
@@ -196,5 +224,33 @@ impl<const L: usize> Window<L> {
     /// Path coordinate of its end.
     pub fn end(&self) -> f64 {
         self.marks.last().map_or(0.0, |mark| mark.s)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn marks_are_found_from_wherever_they_were_looked_for_last() {
+        let mut window = Window::<2>::new();
+        window.marks = (0..50)
+            .map(|n| Mark {
+                t: f64::from(n / 2),
+                s: f64::from(n / 3),
+            })
+            .collect();
+        for near in 0..55 {
+            for place in -1..27 {
+                let place = f64::from(place);
+                window.near.set(near);
+                let found = window.marks_before(|mark| mark.t <= place);
+                assert_eq!(
+                    found,
+                    window.marks.partition_point(|mark| mark.t <= place),
+                    "{near} {place}"
+                );
+            }
+        }
     }
 }
