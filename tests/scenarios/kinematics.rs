@@ -274,7 +274,7 @@ fn what_does_not_fit_is_refused_with_its_place() {
         (
             "corexy.toml",
             &["kinematics.plugin=tripod"],
-            "no kinematics is called \"tripod\"; there is: corexy, wrapped-rotary",
+            "no kinematics is called \"tripod\"; there is: corexy, wrapped-rotary, scara, delta",
         ),
         (
             "corexy.toml",

@@ -2,6 +2,7 @@
 //!
 //! What fails prints the command that replays it. `TANDEM_SEEDS=n` asks for more random programs than usual.
 
+mod arms;
 mod attach;
 mod bad_input;
 #[cfg(feature = "nats")]

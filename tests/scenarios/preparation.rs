@@ -31,6 +31,8 @@ fn registry() -> Registry {
         tandem_after_interpolation::PLUGIN,
         tandem_force_control::PLUGIN,
         tandem_corexy::PLUGIN,
+        tandem_delta::PLUGIN,
+        tandem_scara::PLUGIN,
         tandem_wrapped_rotary::PLUGIN,
         real,
     ] {

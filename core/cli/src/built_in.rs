@@ -16,6 +16,8 @@ pub fn registry() -> Result<Registry, String> {
     registry.register(tandem_force_control::PLUGIN)?;
     registry.register(tandem_corexy::PLUGIN)?;
     registry.register(tandem_wrapped_rotary::PLUGIN)?;
+    registry.register(tandem_scara::PLUGIN)?;
+    registry.register(tandem_delta::PLUGIN)?;
     registry.register(tandem_sim::PLUGIN)?;
     #[cfg(feature = "ethercat")]
     registry.register(tandem_ethercat::PLUGIN)?;

@@ -2,7 +2,7 @@
 
 use tandem_sdk::{AxisVector, Kinematics, KinematicsContext, MAX_AXES, Plugin};
 
-use crate::machine::{REACH_MM, context};
+use crate::machine::context;
 use crate::program::norm;
 use crate::random::Random;
 use crate::report::Report;
@@ -35,7 +35,8 @@ pub fn judge(plugin: Plugin, setup: &Setup, report: &mut Report) {
     }
     let mut uses = 0;
     for _ in 0..PLACES {
-        let place = AxisVector::from_slice(&[0; 3].map(|_| random.between(-REACH_MM, REACH_MM)));
+        let within = |[low, high]: [f64; 2]| random.between(low, high);
+        let place = AxisVector::from_slice(&setup.work_area.map(within));
         let before = heap::uses();
         let found = [
             round_trip(first.as_ref(), &place, &mut timings),

@@ -53,16 +53,19 @@ pub struct Setup {
     pub programs: u64,
     /// Whether a driver that moves metal is driven all the same.
     pub moves_metal: bool,
+    /// Where kinematics are tried: lowest and highest position of X, Y and Z, mm.
+    pub work_area: [[f64; 2]; 3],
 }
 
 impl Default for Setup {
-    /// No options, seed 1, 10 programs, no metal.
+    /// No options, seed 1, 10 programs, no metal, 200 mm around zero.
     fn default() -> Self {
         Self {
             options: String::new(),
             seed: 1,
             programs: 10,
             moves_metal: false,
+            work_area: [[-machine::REACH_MM, machine::REACH_MM]; 3],
         }
     }
 }

@@ -48,15 +48,8 @@ fn judge_joint(
         judge_travel(&joint.limits, &positions, report);
     }
     let mut judge = AxisJudge::new(&joint.limits, machine, options, &positions);
-    // It is as rounded as the axes that it is a sum of.
-    let sums = rows.iter().map(|row| {
-        joint
-            .weights
-            .iter()
-            .zip(row.command)
-            .map(|(w, at)| (w * at).abs())
-            .sum()
-    });
+    // It is as rounded as what it follows from.
+    let sums = rows.iter().map(|row| joint.magnitude(&row.command));
     judge.rounding_mm_per_s = 2.0 * speed_rounding(sums.fold(0.0, f64::max), machine.fine_period_s);
     let differences = judge.judge(&positions, options, report);
     report.maxima.joints.push((joint.name.clone(), differences));

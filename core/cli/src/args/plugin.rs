@@ -36,6 +36,10 @@ pub enum Plugin {
         /// Drive a driver that says it moves metal
         #[arg(long)]
         moves_metal: bool,
+        /// Where kinematics are tried: lowest and highest X, Y and Z, mm
+        #[arg(long, value_name = "X,X,Y,Y,Z,Z", value_parser = work_area, allow_hyphen_values = true,
+              default_value = "-200,200,-200,200,-200,200")]
+        work_area: [[f64; 2]; 3],
     },
     /// Print the built-in plugins, or those of shared libraries
     List {
@@ -58,4 +62,19 @@ pub enum Kind {
     Driver,
     /// Maps axes to joints
     Kinematics,
+}
+
+/// Lowest and highest position of three axes, mm.
+fn work_area(text: &str) -> Result<[[f64; 2]; 3], String> {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
+    let pairs: Vec<[f64; 2]> = numbers
+        .unwrap_or_default()
+        .chunks_exact(2)
+        .map(|pair| [pair[0], pair[1]])
+        .collect();
+    let rises = |[low, high]: &[f64; 2]| low < high && low.is_finite() && high.is_finite();
+    <[[f64; 2]; 3]>::try_from(pairs)
+        .ok()
+        .filter(|pairs| text.split(',').count() == 6 && pairs.iter().all(rises))
+        .ok_or_else(|| "it is six numbers in mm, from low to high for X, Y and Z".to_string())
 }

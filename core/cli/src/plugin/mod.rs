@@ -18,11 +18,13 @@ pub fn plugin(command: &args::Plugin) -> Result<u8, Box<dyn std::error::Error>> 
             seed,
             programs,
             moves_metal,
+            work_area,
         } => {
             let setup = Setup {
                 seed: *seed,
                 programs: *programs,
                 moves_metal: *moves_metal,
+                work_area: *work_area,
                 ..Setup::default()
             };
             check::check(library, options, &setup)

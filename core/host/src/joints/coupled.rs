@@ -8,6 +8,7 @@ use tandem_sdk::{
     PlannerDescription, PluginError, Segment, SegmentSink, Slice,
 };
 
+use super::curved::CurvedJoints;
 use super::space::JointSpace;
 use super::travel::Travel;
 
@@ -31,6 +32,9 @@ impl CoupledJoints {
     ) -> Box<dyn Planner> {
         if joints.are_axes() {
             return planner;
+        }
+        if joints.are_curved() {
+            return Box::new(CurvedJoints::around(planner, joints, machine));
         }
         let lanes = joints.lanes();
         Box::new(Self {

@@ -2,8 +2,8 @@
 //!
 //! Kinematics that are linear in the axes, which is found out here, are kept by planning. A joint that is a scaled axis
 //! makes the limits of that axis narrower. A joint that is a sum of axes becomes an entry after the axes, which planners,
-//! governor and guard treat like an axis ([`tandem_sdk::JointLanes`]). Other kinematics are planned by the limits of the axes
-//! alone; the guard judges their joints.
+//! governor and guard treat like an axis ([`tandem_sdk::JointLanes`]). Of other kinematics the planner knows the limits of the axes
+//! alone, and its plan is driven as fast as the joints allow (`curved`); the guard judges what the kinematics say.
 //!
 //! # Joints that are sums of axes
 //!
@@ -34,6 +34,7 @@
 
 pub mod apart;
 mod coupled;
+mod curved;
 mod fold;
 mod joint;
 mod linear;

@@ -121,7 +121,7 @@ impl JointSpace {
         self.are_own
     }
 
-    /// Whether joints are no linear function of the axes: their limits are guarded, not planned.
+    /// Whether joints are no linear function of the axes.
     pub fn are_curved(&self) -> bool {
         matches!(self.map, Map::Curved(_))
     }

@@ -20,20 +20,88 @@ pub enum Joints {
 pub struct Joint {
     /// Its name in the file.
     pub name: String,
-    /// What a unit of each axis moves it by: mm or deg.
-    pub weights: Position,
+    /// How it follows from the axes.
+    pub map: Map,
     /// Its limits; where it stands does not count.
     pub limits: Axis,
 }
 
+/// How a joint follows from the axes, mm or deg.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Map {
+    /// A unit of each axis moves it by so much.
+    Sum(Position),
+    /// An arm of two links: axes of its plane, lengths, shoulder, sign of the elbow's angle, and whether this is the elbow.
+    Arm {
+        /// The axes of the plane.
+        axes: [usize; 2],
+        /// Upper arm and forearm, mm.
+        links_mm: [f64; 2],
+        /// Where the shoulder is, mm.
+        shoulder_mm: [f64; 2],
+        /// Sign of the elbow's angle.
+        bend: f64,
+        /// This joint is the elbow.
+        is_elbow: bool,
+    },
+    /// A carriage with a rod to a platform: the three axes, length of the rod, and where the column is.
+    Carriage {
+        /// The axes of the plane, and the one along the column.
+        axes: [usize; 3],
+        /// The rod, mm.
+        rod_mm: f64,
+        /// The column, mm.
+        column_mm: [f64; 2],
+    },
+}
+
 impl Joint {
     /// Where it is, mm or deg.
-    pub fn position(&self, axes: &Position) -> f64 {
-        self.weights
-            .iter()
-            .zip(axes)
-            .map(|(weight, axis)| weight * axis)
-            .sum()
+    pub fn position(&self, at: &Position) -> f64 {
+        match self.map {
+            Map::Sum(weights) => weights.iter().zip(at).map(|(w, axis)| w * axis).sum(),
+            Map::Arm {
+                axes: [x, y],
+                links_mm: [upper, fore],
+                shoulder_mm,
+                bend,
+                is_elbow,
+            } => {
+                let (x, y) = (at[x] - shoulder_mm[0], at[y] - shoulder_mm[1]);
+                // By the law of cosines in the triangle of shoulder, elbow and tool.
+                let far = x.hypot(y);
+                let angle = |a: f64, b: f64, opposite: f64| {
+                    ((a * a + b * b - opposite * opposite) / (2.0 * a * b)).acos()
+                };
+                if is_elbow {
+                    bend * (180.0 - angle(upper, fore, far).to_degrees())
+                } else {
+                    y.atan2(x).to_degrees() - bend * angle(upper, far, fore).to_degrees()
+                }
+            }
+            Map::Carriage {
+                axes: [x, y, z],
+                rod_mm,
+                column_mm,
+            } => {
+                let across = (at[x] - column_mm[0]).hypot(at[y] - column_mm[1]);
+                at[z] + ((rod_mm - across) * (rod_mm + across)).sqrt()
+            }
+        }
+    }
+
+    /// The size of the numbers that it is computed from: it is as rounded as they are.
+    pub fn magnitude(&self, at: &Position) -> f64 {
+        match self.map {
+            Map::Sum(weights) => weights
+                .iter()
+                .zip(at)
+                .map(|(w, axis)| (w * axis).abs())
+                .sum(),
+            // An angle is as rounded as the place by the radius; near the ends of the reach by its root.
+            Map::Arm { .. } => 3600.0,
+            Map::Carriage { rod_mm, .. } => 10.0 * rod_mm,
+        }
     }
 }
 
@@ -48,40 +116,41 @@ impl Joints {
             .iter()
             .filter_map(|name| axis_of_name(name))
             .collect();
-        let weights = match plugin.as_str() {
-            "identity" => names
-                .iter()
-                .map(|name| own_axis(keys, name))
-                .collect::<Result<_, _>>()?,
-            "corexy" => corexy(keys, &order)?,
-            "wrapped-rotary" => wrapped(keys, &order)?,
+        let sums = |weights: Vec<Position>| weights.into_iter().map(Map::Sum).collect();
+        let maps: Vec<Map> = match plugin.as_str() {
+            "identity" => sums(
+                names
+                    .iter()
+                    .map(|name| own_axis(keys, name))
+                    .collect::<Result<_, _>>()?,
+            ),
+            "corexy" => sums(corexy(keys, &order)?),
+            "wrapped-rotary" => sums(wrapped(keys, &order)?),
+            "scara" => arm(keys, &order)?,
+            "delta" => carriages(keys, &order)?,
             _ => {
                 return Ok(Self::Unknown(format!(
                     "the kinematics {plugin} are not known"
                 )));
             }
         };
-        if weights.len() != names.len() {
+        if maps.len() != names.len() {
             return Err(keys.error(
                 "joints",
-                &format!(
-                    "{} of the {} joints of {plugin}",
-                    names.len(),
-                    weights.len()
-                ),
+                &format!("{} of the {} joints of {plugin}", names.len(), maps.len()),
             ));
         }
-        let joint = |(name, weights): (&String, Position)| {
+        let joint = |(name, map): (&String, Map)| {
             Ok(Joint {
                 name: name.clone(),
-                weights,
+                map,
                 limits: limits(keys, name, axes)?,
             })
         };
         Ok(Self::Known(
             names
                 .iter()
-                .zip(weights)
+                .zip(maps)
                 .map(joint)
                 .collect::<Result<_, _>>()?,
         ))
@@ -150,6 +219,74 @@ fn wrapped(keys: &Keys, order: &[usize]) -> Result<Vec<Position>, Error> {
         .iter()
         .map(|of| if *of == axis { turn } else { unit(*of) })
         .collect())
+}
+
+/// The axes that the options name, or these.
+fn letters<const N: usize>(keys: &Keys, unless: [&str; N]) -> Result<[usize; N], Error> {
+    let stated = keys
+        .texts("kinematics.options.axes")
+        .unwrap_or_else(|| unless.map(String::from).to_vec());
+    let mut axes = [0; N];
+    for (axis, name) in axes.iter_mut().zip(&stated) {
+        *axis = letter(keys, Some(name))?;
+    }
+    Ok(axes)
+}
+
+/// Shoulder and elbow in the places of the two axes of the plane.
+fn arm(keys: &Keys, order: &[usize]) -> Result<Vec<Map>, Error> {
+    let axes = letters(keys, ["x", "y"])?;
+    let links_mm = [
+        keys.need("kinematics.options.upper_arm_mm")?,
+        keys.need("kinematics.options.forearm_mm")?,
+    ];
+    let shoulder = "kinematics.options.shoulder_mm";
+    let shoulder_mm = if keys.has(shoulder) {
+        keys.pair(shoulder)?
+    } else {
+        [0.0; 2]
+    };
+    let elbow = keys.text("kinematics.options.elbow");
+    let bend = if elbow.is_some_and(|side| side == "right") {
+        1.0
+    } else {
+        -1.0
+    };
+    let of = |axis: &usize| {
+        let is_elbow = *axis == axes[1];
+        if axes.contains(axis) {
+            Map::Arm {
+                axes,
+                links_mm,
+                shoulder_mm,
+                bend,
+                is_elbow,
+            }
+        } else {
+            Map::Sum(unit(*axis))
+        }
+    };
+    Ok(order.iter().map(of).collect())
+}
+
+/// Three carriages in the places of the three axes.
+fn carriages(keys: &Keys, order: &[usize]) -> Result<Vec<Map>, Error> {
+    let axes = letters(keys, ["x", "y", "z"])?;
+    let rod_mm = keys.need("kinematics.options.rod_mm")?;
+    let radius_mm = keys.need("kinematics.options.radius_mm")?;
+    let of = |axis: &usize| match axes.iter().position(|own| own == axis) {
+        Some(number) => {
+            let angle = std::f64::consts::TAU * number as f64 / 3.0;
+            let column_mm = [radius_mm * angle.cos(), radius_mm * angle.sin()];
+            Map::Carriage {
+                axes,
+                rod_mm,
+                column_mm,
+            }
+        }
+        None => Map::Sum(unit(*axis)),
+    };
+    Ok(order.iter().map(of).collect())
 }
 
 /// What a joint does not state it takes from the axis that it states.

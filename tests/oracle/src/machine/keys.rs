@@ -47,12 +47,19 @@ impl Keys {
     }
 
     pub fn range(&self, key: &str) -> Result<[f64; 2], Error> {
+        match self.pair(key)? {
+            [low, high] if low <= high => Ok([low, high]),
+            _ => Err(self.error(key, "not two numbers in ascending order")),
+        }
+    }
+
+    pub fn pair(&self, key: &str) -> Result<[f64; 2], Error> {
         let value = self.find(key).ok_or_else(|| self.error(key, "missing"))?;
         let numbers: Option<Vec<f64>> = value
             .as_array()
             .and_then(|ends| ends.iter().map(as_number).collect());
         match numbers.as_deref() {
-            Some(&[low, high]) if low <= high => Ok([low, high]),
+            Some(&[first, second]) => Ok([first, second]),
             _ => Err(self.error(key, "not two numbers in ascending order")),
         }
     }
