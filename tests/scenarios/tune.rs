@@ -305,7 +305,7 @@ fn python(script: &str, arguments: &[&str]) -> Option<String> {
     Some(text(&output.stdout))
 }
 
-/// The query of docs/batch.md, as DuckDB answers it, and a like one of SQLite, beside what the rows say.
+/// The query of docs/batch.md, as `DuckDB` answers it, and a like one of `SQLite`, beside what the rows say.
 #[test]
 fn duckdb_and_sqlite_read_the_table() {
     let folder = tempfile::tempdir().unwrap();
