@@ -311,8 +311,13 @@ fn axes_that_are_not_alike_are_calibrated_each_by_itself() {
 
 #[test]
 fn a_fit_that_is_worse_than_asked_for_is_taken_knowingly() {
-    // Block-overlap that keeps tolerance and limits is of no form that is known.
-    let set = ["--set", "planner.plugin=block-overlap"];
+    // Block-overlap that keeps tolerance and limits is no look-ahead control.
+    let set = [
+        "--set",
+        "planner.plugin=block-overlap",
+        "--model",
+        "look-ahead",
+    ];
     let folder = tempfile::TempDir::new().unwrap();
     let (refused, model) = calibrated(folder.path(), &set);
     assert_eq!(refused.status.code(), Some(1));

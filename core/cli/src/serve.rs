@@ -6,7 +6,6 @@ use std::os::linux::net::SocketAddrExt as _;
 use std::os::unix::ffi::OsStrExt as _;
 use std::os::unix::net::{SocketAddr, UnixDatagram};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::thread;
 
 use rustix::process::Signal;
@@ -17,7 +16,7 @@ use tandem_session::controller::{Controller, Keeper, NoKeeper, Options, ScriptLi
 use tandem_session::operator::Listen;
 #[cfg(feature = "web")]
 use tandem_session::operator::Role;
-use tandem_state::{Change, Owner, Store, default_path};
+use tandem_state::{Owner, Store, default_path};
 
 use crate::{args, built_in};
 
@@ -119,12 +118,8 @@ fn store(
     {
         std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
     }
-    let store = Store::open(&path, Owner::of(machine))?;
-    if store.is_new() {
-        store.commit(vec![Change::Program(Arc::new(
-            tandem_state::LastingState::initial(machine).to_program(&machine.home),
-        ))])?;
-    }
+    let mut store = Store::open(&path, Owner::of(machine))?;
+    store.fill(machine)?;
     Ok(Some(store))
 }
 

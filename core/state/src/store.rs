@@ -213,6 +213,24 @@ impl Store {
         self.copy.as_deref()
     }
 
+    /// Gives a file that is new what `machine` says of tools, for a controller to begin with; any other file is left as it is, and so
+    /// are the values of one that holds some without having been given initial ones. [`Store::load`] tells the outcome. On disk
+    /// when it returns.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn fill(&mut self, machine: &Machine) -> Result<(), StateError> {
+        if self.filled {
+            return Ok(());
+        }
+        if self.first == LastingState::default() {
+            self.first = LastingState::initial(machine);
+        }
+        self.commit(vec![Change::Whole(Box::new(self.first.clone()))])?;
+        self.filled = true;
+        Ok(())
+    }
+
     /// Whether the file is new: nobody has committed a [`Change::Whole`] with initial values yet.
     pub fn is_new(&self) -> bool {
         !self.filled

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use common::{any_state, any_tool, change, machine_of, owner};
+use tandem_machine::Machine;
 use tandem_rig::Random;
 use tandem_sdk::{Axes, AxisVector};
 use tandem_state::{
@@ -18,6 +19,11 @@ fn folder() -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("deeper/mill.sqlite");
     (folder, path)
+}
+
+fn example() -> Machine {
+    let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines");
+    Machine::read(&examples.join("mill-3axis.toml"), &[]).unwrap()
 }
 
 fn mill() -> Axes {
@@ -50,6 +56,42 @@ fn any_state_of_any_machine_is_there_again_bit_for_bit() {
             "seed {seed}, while it is open"
         );
     }
+}
+
+#[test]
+fn a_file_begins_with_what_the_machine_says_and_keeps_what_it_holds_when_it_is_opened_again() {
+    let (_folder, path) = folder();
+    let machine = example();
+    let mut begun = Store::open(&path, Owner::of(&machine)).unwrap();
+    begun.fill(&machine).unwrap();
+    assert_eq!(begun.load(), &LastingState::initial(&machine));
+    let mut state = begun.load().clone();
+    state.offsets.origins[1] = AxisVector::from_slice(&[12.5]);
+    state.parameters.insert(600, 7.0);
+    let lasting = Arc::new(state.to_program(&machine.home));
+    begun.commit(vec![Change::Program(lasting)]).unwrap();
+    drop(begun);
+    let mut again = Store::open(&path, Owner::of(&machine)).unwrap();
+    again.fill(&machine).unwrap();
+    // A controller that is killed now has written nothing of its own.
+    assert_eq!(Reader::open(&path).unwrap().state().unwrap(), state);
+    assert_eq!(again.load(), &state);
+}
+
+#[test]
+fn values_of_a_file_that_was_never_given_initial_ones_stay() {
+    let (_folder, path) = folder();
+    let machine = example();
+    let store = Store::open(&path, Owner::of(&machine)).unwrap();
+    let mut state = LastingState::default();
+    state.offsets.origins[2] = AxisVector::from_slice(&[0.0, -4.0]);
+    let lasting = Arc::new(state.to_program(&machine.home));
+    store.commit(vec![Change::Program(lasting)]).unwrap();
+    drop(store);
+    let mut store = Store::open(&path, Owner::of(&machine)).unwrap();
+    store.fill(&machine).unwrap();
+    drop(store);
+    assert_eq!(Reader::open(&path).unwrap().state().unwrap(), state);
 }
 
 #[test]

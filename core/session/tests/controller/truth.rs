@@ -6,7 +6,7 @@ use std::path::Path;
 use serde_json::{Value, json};
 use tandem_machine::Machine;
 use tandem_session::controller::NoKeeper;
-use tandem_state::{Change, LastingState, Outcome, Owner, Store};
+use tandem_state::{Change, Outcome, Owner, Store};
 
 use crate::support::{Kept, Says, Told, examples, machine, machine_with};
 
@@ -165,13 +165,8 @@ fn behind_letting_go_the_drives_say_where_they_stand() {
 }
 
 fn open(path: &Path, machine: &Machine) -> Store {
-    let store = Store::open(path, Owner::of(machine)).unwrap();
-    if store.is_new() {
-        let initial = LastingState::initial(machine);
-        store
-            .commit(vec![Change::Whole(Box::new(initial))])
-            .unwrap();
-    }
+    let mut store = Store::open(path, Owner::of(machine)).unwrap();
+    store.fill(machine).unwrap();
     store
 }
 
