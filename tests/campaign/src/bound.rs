@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use tandem_host::{Switches, each_block};
 use tandem_machine::Machine;
-use tandem_oracle::{Axis, Joints, axis_index};
+use tandem_oracle::{Axis, Joints, Map, axis_index};
 use tandem_sdk::{Block, BlockKind, Curve};
 
 /// A program may take this many times as long as it would with a rest at the end of each block.
@@ -190,16 +190,16 @@ impl<'a> Bound<'a> {
             .collect();
         if let Joints::Known(joints) = &self.machine.joints {
             for joint in joints {
+                // No arm and no delta is drawn.
+                let Map::Sum(weights) = &joint.map else {
+                    continue;
+                };
                 // A planner that looks at one axis at a time divides a joint's limits between its axes.
                 let reach: f64 = moved
                     .iter()
-                    .map(|(axis, by)| joint.weights[*axis].abs() * by)
+                    .map(|(axis, by)| weights[*axis].abs() * by)
                     .sum();
-                let pulled = joint
-                    .weights
-                    .iter()
-                    .filter(|weight| **weight != 0.0)
-                    .count() as f64;
+                let pulled = weights.iter().filter(|weight| **weight != 0.0).count() as f64;
                 lanes.push((rates(&joint.limits), reach * pulled));
             }
         }

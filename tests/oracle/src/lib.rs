@@ -51,7 +51,7 @@ mod walk;
 pub use axis::{Axes, LETTERS, Position, axis_index};
 pub use error::Error;
 pub use judge::judge;
-pub use machine::{Axis, Joint, Joints, Machine};
+pub use machine::{Axis, Joint, Joints, Machine, Map};
 pub use options::{Check, Options};
 pub use trace::{Row, Trace};
 pub use verdict::{AxisMaxima, Finding, Kind, Maxima, Outcome, Verdict};

@@ -5,7 +5,7 @@ mod keys;
 
 use std::path::Path;
 
-pub use joints::{Joint, Joints};
+pub use joints::{Joint, Joints, Map};
 use keys::Keys;
 
 use crate::{Error, Position, axis::axis_of_name};
