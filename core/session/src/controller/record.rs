@@ -314,8 +314,9 @@ fn note(told: &Told, written: [Result<(), RecordError>; 3]) {
 
 #[cfg(test)]
 mod tests {
+    use rustix::fs::{CWD, FileType, Mode};
+
     use super::*;
-    use std::process::Command;
 
     /// A disk that hangs: what has come since waits up to the bound, and beyond it somebody is told once, with the first sample that
     /// is missing. Jobs behind it leave nothing once too many wait, and say so.
@@ -334,13 +335,8 @@ mod tests {
             let folder = folder.path().join(format!("{job:06}-mdi"));
             fs::create_dir_all(&folder).unwrap();
             let pipe = folder.join("trace.csv");
-            assert!(
-                Command::new("mkfifo")
-                    .arg(&pipe)
-                    .status()
-                    .unwrap()
-                    .success()
-            );
+            // A child process would hold what other tests let go at this moment.
+            rustix::fs::mknodat(CWD, &pipe, FileType::Fifo, Mode::RWXU, 0).unwrap();
             pipe
         };
         let pipes: Vec<_> = (1..=MAX_WRITERS as u64).map(pipe).collect();
