@@ -231,7 +231,7 @@ impl Sinks {
                 .then(|| machine.planner.plugin.clone()),
             switches: switches(options, clock),
             operator,
-            homed: Corrections::new(machine),
+            homed: Corrections::new(run.homed()),
             progress: Progress::new(run.checked.length_mm, machine.fine_period_s),
             trace: trace.transpose()?,
             blocks: blocks.transpose()?,

@@ -112,6 +112,11 @@ pub struct Machine {
 }
 
 impl Machine {
+    /// Whether a gantry is homed joint by joint, which squares it: its joints are axes of their own meanwhile.
+    pub fn squares(&self) -> bool {
+        self.homing.iter().any(|homing| homing.foot.is_some())
+    }
+
     /// Reads the machine of `path`. `overrides` are dotted paths and values, as `--set path=value` gives them, the
     /// later ones on top; a value that is not TOML is a string.
     ///

@@ -240,6 +240,11 @@ impl FineLoop {
         self.space.found_from(&self.config, &joints).unwrap_or(axes)
     }
 
+    /// Where the joints were told to be last, mm or rad. Host.
+    pub fn told_to_joints(&self) -> AxisVector {
+        self.drives.setpoint.position
+    }
+
     /// Faults the machine; the plugin's own words about it are kept for the host.
     #[cold]
     fn lose_way(&mut self, kind: FaultKind) {

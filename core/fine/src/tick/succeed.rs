@@ -78,6 +78,12 @@ impl FineLoop {
         self.outputs.ended && !matches!(self.phase, Phase::Ramping(_) | Phase::Faulted)
     }
 
+    /// Whether nothing is left to do: the program has ended, and the drives have let go where they do not stay enabled; or a
+    /// fault has brought the machine to rest. Any side.
+    pub fn is_done(&self) -> bool {
+        self.is_over() || self.stays && self.has_ended()
+    }
+
     /// What the job did, once it has ended. Fine thread or host; does not allocate.
     pub fn job_end(&self) -> JobEnd {
         JobEnd {

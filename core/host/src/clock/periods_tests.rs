@@ -196,7 +196,7 @@ fn every_mixture_of_stalls_is_counted() {
 }
 
 /// A fine loop with a minute of motion ahead, or none, and both other ends so that the rings live.
-fn fine_loop(moves: bool) -> (FineLoop, RoughEnd, HostEnd) {
+fn fine_loop(moves: bool) -> (Box<FineLoop>, RoughEnd, HostEnd) {
     let axis = AxisLimits {
         min_mm: -100.0,
         max_mm: 100.0,
@@ -227,7 +227,7 @@ fn fine_loop(moves: bool) -> (FineLoop, RoughEnd, HostEnd) {
     driver.start().unwrap();
     let mut fine = FineLoop::new(&config, end, Box::new(driver), None);
     fine.reset();
-    (fine, rough, host)
+    (Box::new(fine), rough, host)
 }
 
 /// A minute at 1 mm/s, which the machine takes up at once.
@@ -259,7 +259,7 @@ impl Body for AtMost {
 }
 
 /// 1 s of a fine loop with these stalls asleep.
-fn second_of(moves: bool, stalls: Vec<(usize, i64)>) -> FineLoop {
+fn second_of(moves: bool, stalls: Vec<(usize, i64)>) -> Box<FineLoop> {
     let (fine, _rough, _host) = fine_loop(moves);
     let mut clock = Scripted {
         now: Now::default(),

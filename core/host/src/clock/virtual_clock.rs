@@ -15,7 +15,7 @@ use crate::soft::soft_loop::SoftLoop;
 /// Machine time, s, without any passing of program time after which a run without further commands is given up.
 const PATIENCE_S: f64 = 60.0;
 
-/// Drives the run to its end. `commands` are in order of their ticks.
+/// Drives the run to its end; one that stays at its drives then, until another takes over. `commands` are in order of their ticks.
 pub fn drive(
     soft_loop: &mut SoftLoop<'_>,
     fine: &mut FineLoop,
@@ -37,17 +37,17 @@ pub fn drive(
     }
     // A fault on the way has its samples too, and an abort its rest.
     soft_loop.drain();
-    if fine.is_over() {
+    if fine.is_done() {
         soft_loop.take_rests();
     }
-    while !fine.is_over() {
+    while !fine.is_done() {
         if commands.stalled == 0 {
             soft_loop.step();
         }
         commands.stalled = commands.stalled.saturating_sub(1);
         for _ in 0..fine_per_rough {
             // As on the wall clock, no sample follows the last.
-            if fine.is_over() {
+            if fine.is_done() {
                 break;
             }
             commands.give(soft_loop, fine);

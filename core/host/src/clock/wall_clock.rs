@@ -11,7 +11,7 @@ use rustix::time::{Timespec, clock_gettime};
 use tandem_fine::FineLoop;
 use tandem_machine::FineThread;
 use tandem_recorder::PageFaults;
-use tandem_rings::{Sizes, sample_ring};
+use tandem_rings::{HostEnd, Sizes, sample_ring};
 
 use crate::clock::periods::{Body, PeriodClock, Timing, run};
 use crate::clock::realtime::{ProcessGrants, page_faults_of_this_thread, prepare_thread};
@@ -45,14 +45,11 @@ pub struct Ended<B> {
 /// Drives the run to its end in real time; gives the fine loop back.
 pub fn drive(
     soft_loop: &mut SoftLoop<'_>,
-    mut fine: FineLoop,
+    mut fine: Box<FineLoop>,
     periods: Periods,
     watch: Option<FineWatch>,
-) -> Result<Ended<FineLoop>, HostError> {
-    // Here the recorder may look away for seconds.
-    let (to_host, from_fine) = sample_ring(Sizes::default().samples);
-    fine.hand_out_through(to_host);
-    soft_loop.host.samples = from_fine;
+) -> Result<Ended<Box<FineLoop>>, HostError> {
+    give_room(&mut soft_loop.host, &mut fine);
     fill_first(soft_loop);
     let body = FineBody { fine, watch };
     let thread = TimedThread::start(body, periods.fine_ns, periods.fine_thread)?;
@@ -75,6 +72,13 @@ pub fn drive(
     })
 }
 
+/// Samples of a loop that has not begun get room for a recorder that looks away for seconds, as it may in real time.
+pub fn give_room(host: &mut HostEnd, fine: &mut FineLoop) {
+    let (to_host, from_fine) = sample_ring(Sizes::default().samples);
+    fine.hand_out_through(to_host);
+    host.samples = from_fine;
+}
+
 /// Fills the queue before the first fine period, so that its first tick is the first tick on either clock.
 fn fill_first(soft_loop: &mut SoftLoop<'_>) {
     soft_loop.step();
@@ -82,7 +86,7 @@ fn fill_first(soft_loop: &mut SoftLoop<'_>) {
 
 /// The fine loop as the body of its thread.
 pub struct FineBody {
-    pub fine: FineLoop,
+    pub fine: Box<FineLoop>,
     /// Who looks whether it comes back.
     pub watch: Option<FineWatch>,
 }

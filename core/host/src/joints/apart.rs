@@ -30,7 +30,7 @@ impl Apart {
     /// # Errors
     /// The joints are wrong, or more than there are letters for.
     pub fn of(machine: &Machine, registry: &Registry) -> Result<Option<Self>, HostError> {
-        if machine.homing.iter().all(|homing| homing.foot.is_none()) {
+        if !machine.squares() {
             return Ok(None);
         }
         let space = JointSpace::of(machine, registry)?;

@@ -664,7 +664,7 @@ impl<'r> Resident<'r> {
 }
 
 /// Stands in a loop until it takes over the drives.
-struct NoDriver;
+pub(crate) struct NoDriver;
 
 impl Driver for NoDriver {
     fn describe(&self) -> DriverDescription {

@@ -8,6 +8,7 @@
 //! both clocks.
 
 pub mod job;
+mod squaring;
 mod summarise;
 
 use std::sync::Arc;
@@ -18,9 +19,9 @@ use tandem_fine::{Fault, FineLoop, Left};
 use tandem_gcode::{CheckReport, Program};
 use tandem_machine::Machine;
 use tandem_recorder::{LatenessUs, PageFaults, Summary};
-use tandem_rings::Switched;
+use tandem_rings::{Controls, Status, Switched};
 use tandem_rough::Source;
-use tandem_sdk::{AxisVector, PluginError};
+use tandem_sdk::{AxisVector, Driver, PluginError};
 
 use crate::clock::exchange_time::{self, ExchangeTimes};
 use crate::clock::periods::Timing;
@@ -32,6 +33,7 @@ use crate::error::HostError;
 use crate::plugins::hang::HangWatch;
 use crate::plugins::plugin_log::drain_plugin_log;
 use crate::plugins::registry::Registry;
+use crate::resident::NoDriver;
 use crate::setup::claim::Claim;
 use crate::setup::parts;
 use crate::setup::ready::Ready;
@@ -40,11 +42,14 @@ use crate::soft::command::Timed;
 use crate::soft::soft_loop::RunObserver;
 use crate::switches::{Clock, Lead, Switches};
 use job::{Job, Made};
+use squaring::{Squared, Squaring};
 
 /// A run that is ready: the program is checked, the plugins are open, nothing has moved.
 pub struct Run {
     job: Job,
-    fine: FineLoop,
+    fine: Box<FineLoop>,
+    /// What homes first, and has the drives until then, where a gantry squares itself.
+    squaring: Option<Squaring>,
     exchange: Arc<ExchangeTimes>,
     watch: Option<HangWatch>,
     clock: Clock,
@@ -78,9 +83,8 @@ impl Run {
         program: Program,
         switches: Switches,
     ) -> Result<Self, HostError> {
-        Self::open(Ready::of_program(
-            machine, registry, program, switches, true,
-        )?)
+        let ready = Ready::of_program(machine, registry, program, switches, true)?;
+        Self::open(ready, registry)
     }
 
     /// A run of what `source` gives, which sees to it that every block is one that the planner takes.
@@ -95,13 +99,8 @@ impl Run {
         switches: Switches,
     ) -> Result<Self, HostError> {
         let behind = |machine: &Machine| parts::behind_homing(machine, source, switches);
-        Self::open(Ready::of_source(
-            machine,
-            registry,
-            Some(name),
-            behind,
-            switches,
-        )?)
+        let ready = Ready::of_source(machine, registry, Some(name), behind, switches)?;
+        Self::open(ready, registry)
     }
 
     /// A run that homes the axes of [`Machine::homing`], which `homing` does, and nothing else. Its samples are in the coordinates of the
@@ -121,17 +120,15 @@ impl Run {
             unhomed: true,
             ..switches
         };
-        Self::open(Ready::of_source(
-            machine,
+        let alone = |machine: &Machine| homing(machine, None);
+        Self::open(
+            Ready::of_source(machine, registry, None, alone, switches)?,
             registry,
-            None,
-            |machine| homing(machine, None),
-            switches,
-        )?)
+        )
     }
 
     /// Makes the loops around drives that are claimed.
-    fn open(mut ready: Ready) -> Result<Self, HostError> {
+    fn open(mut ready: Ready, registry: &Registry) -> Result<Self, HostError> {
         let elsewhere = Claim::elsewhere(ready.claim.roster());
         let claim = std::mem::replace(&mut ready.claim, elsewhere);
         let watch = ready.watch.take();
@@ -144,14 +141,44 @@ impl Run {
             ready.machine.fine_period_s,
             Arc::clone(&exchange),
         ));
-        let made = Made::of(ready, &attached, false, (Arc::default(), Arc::default()));
-        let mut fine = FineLoop::new(&made.config, made.end, driver, made.kinematics);
+        let shared: (Arc<Controls>, Arc<Status>) = (Arc::default(), Arc::default());
+        // What homes one joint of a gantry after the other is on the machine itself, whose joints are its axes there.
+        let squares = ready.machine.squares() && !ready.joints.are_axes();
+        let homing = ready.switches.home.filter(|_| squares);
+        let mut driver: Box<dyn Driver> = driver;
+        let mut squaring = None;
+        if let Some(homing) = homing {
+            let (machine, roster) = (&ready.machine, ready.claim.roster());
+            let made = Squaring::of(
+                machine,
+                registry,
+                (homing, ready.switches),
+                (driver, &attached, &roster),
+                shared.clone(),
+            );
+            driver = Box::new(NoDriver);
+            match made {
+                Ok(made) => squaring = Some(made),
+                Err((refused, mut driver)) => {
+                    let _ = driver.stop();
+                    return Err(refused);
+                }
+            }
+        }
+        let made = Made::of(ready, &attached, false, shared);
+        let mut fine = Box::new(FineLoop::new(
+            &made.config,
+            made.end,
+            driver,
+            made.kinematics,
+        ));
         fine.reset();
         let job = made.job;
         let simulated = job.roster.describe().simulated != 0;
         Ok(Self {
             watch,
             fine,
+            squaring,
             clock: job.switches.clock.unwrap_or(if simulated {
                 Clock::Virtual
             } else {
@@ -166,16 +193,17 @@ impl Run {
 
     /// What is on when the run begins: what the run before it in a session has left. Host, before it is driven.
     pub fn begin_switched(&mut self, switched: &Switched) {
-        self.fine.begin_switched(switched);
+        let first = self.squaring.as_mut().map(|squaring| &mut squaring.fine);
+        first.unwrap_or(&mut self.fine).begin_switched(switched);
     }
 
     /// The operator's end of the run, to give commands from other threads.
-    pub fn controls(&self) -> Arc<tandem_rings::Controls> {
+    pub fn controls(&self) -> Arc<Controls> {
         Arc::clone(&self.job.host.controls)
     }
 
     /// The fine loop's status, to look at from other threads.
-    pub fn status(&self) -> Arc<tandem_rings::Status> {
+    pub fn status(&self) -> Arc<Status> {
         Arc::clone(&self.job.host.status)
     }
 
@@ -187,6 +215,12 @@ impl Run {
     /// Bit per axis of which the drives did not know where it is when they were attached.
     pub fn unknown_axes(&self) -> u32 {
         self.unknown_axes
+    }
+
+    /// The machine as what homes it in front of the run sees it: the joints of a gantry that squares itself are axes there.
+    pub fn homed(&self) -> &Machine {
+        let squaring = self.squaring.as_ref();
+        squaring.map_or(&self.job.machine, Squaring::machine)
     }
 
     /// Whether the planner makes use of velocity steps where blocks meet.
@@ -216,40 +250,63 @@ impl Run {
     ) -> Result<Outcome, HostError> {
         let started = Instant::now();
         if let Err(refused) = begin(&self.job.machine, &self.job.roster, clock) {
-            let _ = self.fine.into_driver().stop();
+            let squaring = self.squaring.map(|squaring| squaring.fine);
+            let first = squaring.unwrap_or(*self.fine);
+            let _ = first.into_driver().stop();
             return Err(refused);
         }
         if let Some(watch) = &self.watch {
             watch.begin(self.controls(), self.status());
         }
-        let mut fine = self.fine;
-        let (mut soft_loop, conclusion) = self.job.begin(clock, observer);
-        let machine = &conclusion.machine;
-        let mut measured = None;
         self.exchange.measures.store(clock == Clock::Wall, Relaxed);
-        match clock {
-            Clock::Virtual => virtual_clock::drive(
-                &mut soft_loop,
-                &mut fine,
-                machine.fine_periods_per_rough,
-                commands,
-            ),
-            Clock::Wall => {
-                let watch = self.watch.as_ref().map(HangWatch::for_fine);
-                let timed = wall_clock::drive(&mut soft_loop, fine, periods(machine), watch)?;
-                (fine, measured) = (timed.body, Some((timed.timing, timed.page_faults)));
+        let joints = Arc::clone(&self.job.joints);
+        let (mut job, mut fine) = (self.job, self.fine);
+        let periods = periods(&job.machine);
+        let watch = self.watch.as_ref().map(HangWatch::for_fine);
+        let first = match (self.squaring, clock) {
+            (None, _) => Squared::Here(fine),
+            (Some(squaring), Clock::Virtual) => squaring.in_lockstep(fine, observer),
+            (Some(squaring), Clock::Wall) => {
+                wall_clock::give_room(&mut job.host, &mut fine);
+                squaring.in_real_time(fine, periods, watch.clone(), observer)?
             }
-        }
+        };
+        let (mut soft_loop, conclusion) = job.begin(clock, observer);
+        let (mut measured, mut words) = (None, None);
+        let fine = match (first, clock) {
+            (Squared::Here(mut fine), Clock::Virtual) => {
+                let per_rough = conclusion.machine.fine_periods_per_rough;
+                virtual_clock::drive(&mut soft_loop, &mut fine, per_rough, commands);
+                fine
+            }
+            (Squared::Here(fine), Clock::Wall) => {
+                let timed = wall_clock::drive(&mut soft_loop, fine, periods, watch)?;
+                measured = Some((timed.timing, timed.page_faults));
+                timed.body
+            }
+            (Squared::Thread(thread), _) => {
+                let timed = squaring::follow(&mut soft_loop, thread, periods)?;
+                measured = Some((timed.timing, timed.page_faults));
+                timed.body.fine
+            }
+            (Squared::Failed(fine, why), _) => {
+                words = Some(why);
+                fine
+            }
+        };
         let fault = fine.fault();
         let mut summary = conclusion.summary(&mut soft_loop, &fine.counters());
         tell_times(&mut summary, measured.as_ref(), &self.exchange);
         let late = summary.late_cause();
-        let words =
-            |fault: Fault| conclusion.words(&fault, &fine, soft_loop.soft_cause(), late.as_deref());
-        summary.fault = fault.map(words);
+        summary.fault = fault.map(|fault| {
+            words.unwrap_or_else(|| {
+                conclusion.words(&fault, &fine, soft_loop.soft_cause(), late.as_deref())
+            })
+        });
         // Who homes first in the next run as well begins where the drives are, whatever the axes were called.
-        let sent = conclusion.switches.home.is_some() || fine.joints_went_alone();
-        let position = if sent {
+        let position = if conclusion.switches.home.is_some() && !joints.are_axes() {
+            joints.to_axes(&fine.told_to_joints())
+        } else if conclusion.switches.home.is_some() || fine.joints_went_alone() {
             fine.sent()
         } else {
             soft_loop.monitor.position

@@ -1,7 +1,7 @@
 //! The drives while they are claimed: brought up, told where they stand, and let go of whatever happens.
 
 use tandem_faults::Faults;
-use tandem_machine::Machine;
+use tandem_machine::{AxisHoming, Machine};
 use tandem_sdk::{
     Attached, AxisVector, Driver, DriverDescription, JointState, MAX_DELAY_PERIODS, Words,
 };
@@ -302,8 +302,16 @@ impl Look<'_> {
             .homing
             .iter()
             .filter(|_| switches.home.is_some());
-        // Where axes are homed, joints are axes.
-        let homed = homing.fold(0, |joints, of| joints | 1 << of.axis);
+        let stated = &self.machine.joints;
+        let is_homed = |of: &AxisHoming, joint: usize| {
+            let this = &self.joints.joints[joint];
+            let foot = of.foot.and_then(|foot| stated.get(foot.joint));
+            foot.map_or(this.axis == Some(of.axis), |foot| foot.name == this.name)
+        };
+        let homed = homing.fold(0, |mask, of| {
+            let joints = (0..self.joints.count()).filter(|joint| is_homed(of, *joint));
+            joints.fold(mask, |mask, joint| mask | 1 << joint)
+        });
         let known = self.attached.known | self.attached.homed | homed;
         self.refuse(
             |i| known >> i & 1 == 0 && !switches.unhomed,

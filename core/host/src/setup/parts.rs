@@ -94,15 +94,15 @@ pub fn source(
     Ok(behind_homing(machine, source, switches))
 }
 
-/// `source`, behind homing where that is asked for.
+/// `source`, behind homing where that is asked for; a gantry squares itself by a job of its own.
 pub fn behind_homing(
     machine: &Machine,
     source: Box<dyn Source + Send>,
     switches: Switches,
 ) -> Box<dyn Source + Send> {
     match switches.home {
-        Some(homing) => homing(machine, Some(source)),
-        None => source,
+        Some(homing) if !machine.squares() => homing(machine, Some(source)),
+        _ => source,
     }
 }
 
@@ -364,7 +364,7 @@ pub fn fine_config(
         kept_outputs: machine.kept_outputs(),
         pause_at_stops: switches.pause_at_stops,
         dry_run: switches.dry_run,
-        unhomed: if switches.home.is_some() {
+        unhomed: if switches.home.is_some() && joints.are_axes() {
             machine
                 .homing
                 .iter()

@@ -141,13 +141,8 @@ pub fn check_homing(
             "no axis has a [homing.<axis>] table: there is nothing to home",
         );
     }
-    if switches.home.is_some() && !joints.are_axes() {
-        let is_squared = machine.homing.iter().any(|homing| homing.foot.is_some());
+    if switches.home.is_some() && !joints.are_axes() && !machine.squares() {
         let (key, cause) = match machine.kinematics.plugin.as_str() {
-            "identity" if is_squared => (
-                "homing",
-                "a gantry squares itself by `tandem home`, and by the request `home` of tandem serve: not in front of a program",
-            ),
             "identity" => (
                 "joints",
                 "--home is refused: a gantry squares itself by a switch at each of its joints, in tables such as [homing.y1] and \

@@ -3,13 +3,20 @@
 
 use std::fmt::Write as _;
 use std::io::Write as _;
+use std::sync::Arc;
+use std::sync::atomic::Ordering::Relaxed;
 
 use serde_json::{Value, json};
+use tandem_gcode::Program;
+use tandem_host::{Clock, Run, RunObserver, Switches};
 use tandem_machine::Machine;
 use tandem_rig::Random;
+use tandem_rings::{Controls, Sample};
+use tandem_sdk::{Event, EventKind};
+use tandem_session::HOMING;
 use tandem_session::controller::NoKeeper;
 
-use crate::support::{Says, Told};
+use crate::support::{Says, Told, registry};
 
 /// How a joint is homed, mm and mm/s.
 #[derive(Clone, Debug)]
@@ -354,4 +361,149 @@ fn an_index_pulse_counts_instead_of_the_switch_before_it() {
             );
         }
     }
+}
+
+/// What a run in front of which a gantry squares itself was seen to do.
+#[derive(Default)]
+struct Seen {
+    first: Option<Sample>,
+    last: Option<Sample>,
+    found: usize,
+    /// Lines whose blocks were driven.
+    driven: Vec<u32>,
+    stops_at: Option<Arc<Controls>>,
+}
+
+impl RunObserver for Seen {
+    fn event(&mut self, event: &Event) {
+        self.found += usize::from(event.kind == EventKind::Correct);
+        if let Some(controls) = self.stops_at.as_ref().filter(|_| self.found > 1) {
+            controls.abort.store(true, Relaxed);
+        }
+    }
+
+    fn sample(&mut self, sample: &Sample, _deviation_mm: f64, _signals: &[f64]) {
+        self.first.get_or_insert(*sample);
+        self.last = Some(*sample);
+        if sample.feed_mm_per_s > 0.0 && self.driven.last() != Some(&sample.line) {
+            self.driven.push(sample.line);
+        }
+    }
+}
+
+/// Whether every joint is at home, as the switches there say.
+fn is_at_home(sample: &Sample) -> bool {
+    let all = [20, 30].map(|first: u64| 0b1111 << first);
+    let all = all[0] | all[1];
+    sample.inputs & all == all
+}
+
+/// The program that is run behind homing: it goes elsewhere, and home again.
+fn away_and_home(portal: &Portal) -> String {
+    let [x, y, z] = portal.home;
+    format!("G21 G90 F6000\nG1 X60 Y-40 Z20\nG1 Y45 X-30\nG1 X{x:.9} Y{y:.9} Z{z:.9}\nM2\n")
+}
+
+fn run_of(portal: &Portal, text: &str) -> (Run, Machine) {
+    let machine = machine(text);
+    let program = Program::spool("away.ngc", away_and_home(portal).as_bytes()).unwrap();
+    let switches = Switches {
+        home: Some(HOMING),
+        ..Switches::default()
+    };
+    let run = Run::prepare(machine.clone(), &registry(), program, switches);
+    (run.unwrap_or_else(|e| panic!("{portal:?} {e}")), machine)
+}
+
+/// A run of its own homes first: each foot of the gantry stands at home when the program begins, and again at its end.
+#[test]
+fn random_gantries_square_themselves_in_front_of_a_program() {
+    let mut random = Random::from_the_clock();
+    for _ in 0..6 {
+        let portal = Portal::draw(&mut random);
+        let (run, machine) = run_of(&portal, &portal.text());
+        let mut seen = Seen::default();
+        let outcome = run.drive(Clock::Virtual, &[], &mut seen).unwrap();
+        assert_eq!(outcome.summary.fault, None, "{portal:?}");
+        assert_eq!(
+            (seen.found, &*seen.driven),
+            (4, &[2, 3, 4][..]),
+            "{portal:?}"
+        );
+        assert_eq!(outcome.summary.program, "away.ngc");
+        let (first, last) = (seen.first.unwrap(), seen.last.unwrap());
+        assert!(is_at_home(&first) && is_at_home(&last), "{portal:?}");
+        assert_eq!(first.tick, 0, "the record begins with the program");
+        for (at, expected) in [(&first, 0.0), (&last, 1e-8)] {
+            for axis in 0..3 {
+                let off = (at.command[axis] - machine.home[axis]).abs();
+                assert!(off <= expected, "{portal:?}: {off}");
+            }
+        }
+    }
+}
+
+/// What ends the homing ends the run: nothing of the program is driven.
+#[test]
+fn a_program_is_not_driven_behind_a_gantry_that_could_not_square_itself() {
+    let mut random = Random::from_the_clock();
+    for aborts in [true, false] {
+        let portal = Portal::draw(&mut random);
+        let foot = &portal.joints[1];
+        let far = if foot.search < 0.0 { -1e5 } else { 1e5 };
+        let lies = format!("_mm = {}\nbounce_periods", foot.switch_mm);
+        let dead = portal
+            .text()
+            .replacen(&lies, &format!("_mm = {far}\nbounce_periods"), 1);
+        let text = if aborts { portal.text() } else { dead };
+        let (run, _) = run_of(&portal, &text);
+        let mut seen = Seen {
+            stops_at: aborts.then(|| run.controls()),
+            ..Seen::default()
+        };
+        let outcome = run.drive(Clock::Virtual, &[], &mut seen).unwrap();
+        let told = [&outcome.summary.fault, &outcome.summary.stopped];
+        let expected = [
+            (!aborts).then_some("homing y1: the switch on input"),
+            aborts.then_some("stopped by the operator before the first line"),
+        ];
+        for (told, expected) in told.into_iter().zip(expected) {
+            let words = told.as_deref();
+            let fits = expected.is_none_or(|part| words.is_some_and(|words| words.contains(part)));
+            assert!(
+                fits && words.is_some() == expected.is_some(),
+                "{portal:?} {told:?}"
+            );
+        }
+        assert!(seen.driven.is_empty(), "{portal:?} {:?}", seen.driven);
+    }
+}
+
+/// In real time the program takes over between two periods: no drive that watches its master is left alone meanwhile.
+#[test]
+fn a_gantry_squares_itself_in_front_of_a_program_in_real_time() {
+    let mut random = Random::from_the_clock();
+    let mut portal = Portal::draw(&mut random);
+    (portal.period_ms, portal.acceleration, portal.unknown_mm) = (1.0, 2000.0, 0.3);
+    (portal.max_skew_mm, portal.home) = (2.0, [0.0; 3]);
+    for joint in &mut portal.joints {
+        (joint.search, joint.latch, joint.back_off) = (40.0_f64.copysign(joint.search), 2.0, 1.4);
+        joint.switch_mm = 2.0_f64.copysign(joint.search);
+    }
+    // How late a busy computer wakes the loop is asked by other tests.
+    let text = portal.text().replace(
+        "fine_period_ms = 1\n",
+        "fine_period_ms = 1\nmax_missed_periods = 1000000\nmax_missed_share = 1\n",
+    );
+    let (run, _) = run_of(&portal, &text);
+    let mut seen = Seen::default();
+    let outcome = run.drive(Clock::Wall, &[], &mut seen).unwrap();
+    assert_eq!(outcome.summary.fault, None, "{portal:?}");
+    assert_eq!(
+        (seen.found, &*seen.driven),
+        (4, &[2, 3, 4][..]),
+        "{portal:?}"
+    );
+    let (first, last) = (seen.first.unwrap(), seen.last.unwrap());
+    assert!(is_at_home(&first) && is_at_home(&last), "{portal:?}");
 }
