@@ -1,6 +1,6 @@
 // What is always at hand: state, next step, control, start, hold, abort, switches, overrides, the software stop.
 import { bind, machine, onFrame, setLease } from "./machine.js";
-import { STATES, fixed, nextStep, say, text } from "./words.js";
+import { STATES, fixed, nextStep, say, shownState, text } from "./words.js";
 
 const at = (id) => document.getElementById(id);
 let step = null;
@@ -102,8 +102,8 @@ function override(slider, request) {
 
 function draw() {
   const { status } = machine;
-  const state = status ? status.state : "away";
-  const [word, mark, mood] = STATES[state] || [state, "?", "waits"];
+  const shown = shownState(status), state = status ? status.state : "away";
+  const [word, mark, mood] = STATES[shown] || [shown, "?", "waits"];
   const body = document.body;
   if (body.dataset.state !== state) body.dataset.state = state;
   if (body.dataset.mood !== mood) body.dataset.mood = mood;
@@ -141,7 +141,7 @@ function draw() {
   for (const [id, on] of [["single-block", status.single_block], ["optional-stop", status.optional_stop], ["block-delete", status.block_delete]]) {
     at(id).setAttribute("aria-pressed", String(Boolean(on)));
   }
-  text("job", status.job === "program" || !status.job ? status.program || "No program" : STATES[state][0]);
+  text("job", status.job === "program" || !status.job ? status.program || "No program" : word);
   text("line", status.job === "program" && status.line ? `line ${status.line}` : "");
   text("share", status.job === "program" ? `${fixed(status.progress * 100, 0)} %` : "");
   at("progress").style.transform = `scaleX(${status.job === "program" ? status.progress : 0})`;

@@ -9,9 +9,16 @@ export const STATES = {
   "mdi": ["Manual line", "▶", "moves"],
   "running": ["Running", "▶", "moves"],
   "held": ["Held", "❚❚", "waits"],
+  "slowing": ["Holding", "❚❚", "waits"],
   "stopping": ["Stopping", "…", "waits"],
   "fault": ["Fault", "!", "stopped"],
 };
+
+// The state as it is shown: a machine that is held is so once it stands.
+export function shownState(status) {
+  if (!status) return "away";
+  return status.state === "held" && !status.at_rest ? "slowing" : status.state;
+}
 
 // What the operator can do next: words, and the request behind the button.
 export function nextStep(status, described, hasLease) {
@@ -29,6 +36,7 @@ export function nextStep(status, described, hasLease) {
       return [axes ? `It is not known where ${axes} ${status.not_homed.length > 1 ? "stand" : "stands"}.` : "The machine is to be homed first.", "Home all", "home"];
     }
     case "held":
+      if (!status.at_rest) return ["The machine comes to rest on the path.", "Resume", "resume"];
       if (status.waits_on_line !== null) return [`The program waits at line ${status.waits_on_line}.`, "Resume", "resume"];
       return [status.held_by ? `Held by ${status.held_by}: release it, then resume.` : "Feed hold: the machine stands on the path.", "Resume", "resume"];
     case "running":

@@ -44,7 +44,7 @@ class Job:
     """``program``, ``mdi``, ``jog`` or ``home``."""
     name: str
     outcome: str
-    """``done``, ``aborted`` or ``fault``."""
+    """``done``, ``aborted``, ``emergency-stop`` or ``fault``."""
     fault: Optional[str]
     position: Json
     """Where the machine stands: ``x_mm``, ``a_deg`` …"""
@@ -194,6 +194,14 @@ class Client:
         while True:
             status = self.status()
             if status["state"] in states:
+                return status
+            time.sleep(0.02)
+
+    def wait_for_rest(self) -> Json:
+        """Waits until all axes stand, as some time behind a ``hold``; the status."""
+        while True:
+            status = self.status()
+            if status["at_rest"]:
                 return status
             time.sleep(0.02)
 

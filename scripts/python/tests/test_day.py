@@ -111,6 +111,8 @@ class Day(WithController):
             machine.wait_for_state("running")
             machine.hold()
             machine.wait_for_state("held")
+            rest = machine.wait_for_rest()
+            self.assertEqual((rest["state"], rest["position"]), ("held", machine.status()["position"]))
             with Client(controller.socket) as other, self.assertRaises(Refused):
                 other.request("resume")
             machine.resume()

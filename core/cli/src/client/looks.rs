@@ -97,14 +97,16 @@ fn answered(connection: &mut Connection, options: &args::Ask) -> Result<u8, Trou
 pub fn shown(status: &Value) -> String {
     let text = |key: &str| status[key].as_str().unwrap_or_default().to_string();
     let number = |key: &str| status[key].as_f64().unwrap_or_default();
+    let slows = status["state"] == "held" && status["at_rest"] == false;
     let fault = if status["fault"].is_string() {
         format!("  fault: {}", text("fault"))
     } else {
         String::new()
     };
     format!(
-        "{}  machine {}  {} {}  F{:.0} S{:.0} T{:.0}  line {:.0}{}{fault}",
+        "{}{}  machine {}  {} {}  F{:.0} S{:.0} T{:.0}  line {:.0}{}{fault}",
         text("state"),
+        if slows { ", slowing down" } else { "" },
         letters(&status["position"]),
         text("system"),
         letters(&status["work_position"]),

@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering::Relaxed;
 
 use serde::Serialize;
 use tandem_machine::Machine;
-use tandem_rings::Status;
+use tandem_rings::{JointStatus, Status};
 use tandem_sdk::{JointState, MAX_AXES, Words};
 
 /// One joint's drive at one moment.
@@ -51,7 +51,7 @@ fn names(machine: &Machine) -> Vec<String> {
 /// Every joint's drive as it was last heard of. Host; allocates.
 pub fn lines(machine: &Machine, status: &Status) -> Vec<JointLine> {
     let hexadecimal = status.hexadecimal_codes.load(Relaxed);
-    let line = |(name, joint): (String, &tandem_rings::JointStatus)| {
+    let line = |(name, joint): (String, &JointStatus)| {
         let (state, code) = joint.load();
         JointLine {
             name,
@@ -82,6 +82,12 @@ pub fn enabling(machine: &Machine, status: &Status) -> Option<String> {
         .map(word)
         .collect();
     (!missing.is_empty()).then(|| format!("enabling {}", missing.join(", ")))
+}
+
+/// Whether a drive moves its joint by itself, to home it. Any side.
+pub fn is_homing(status: &Status) -> bool {
+    let homes = |joint: &JointStatus| joint.load().0 == JointState::Homing;
+    status.joints.iter().any(homes)
 }
 
 /// A joint's state as people read it.

@@ -266,7 +266,8 @@ pub struct Inner {
     pub policy_parameters: BTreeMap<String, f64>,
     /// What the policy script declares, as it is told.
     pub declared_parameters: Vec<Value>,
-    last_state: Option<ControllerState>,
+    /// The state that was told last, and whether a held machine stood.
+    last_state: Option<(ControllerState, bool)>,
 }
 
 /// The desk.
@@ -523,16 +524,18 @@ impl Desk {
         }
     }
 
-    /// Tells everybody where the state is another one than last.
+    /// Tells everybody where the state is another one than last, and where a machine that is held has come to rest.
     pub fn tell_state(&self) {
         let mut inner = self.lock();
         let state = self.state_of(&inner);
-        if inner.last_state.replace(state) != Some(state) {
+        let at_rest = self.hub.is_at_rest();
+        let told = (state, at_rest && state == ControllerState::Held);
+        if inner.last_state.replace(told) != Some(told) {
             let fault = inner.fault.as_ref().map(|(words, _)| words.clone());
             drop(inner);
             self.send(
                 None,
-                &json!({ "event": "state", "state": state.name(), "fault": fault }),
+                &json!({ "event": "state", "state": state.name(), "at_rest": at_rest, "fault": fault }),
             );
         }
     }

@@ -79,7 +79,10 @@ pub fn schema() -> Value {
 
 /// What clients are told that they have not asked for in this moment.
 pub const EVENTS: [(&str, &str); 12] = [
-    ("state", "the machine's state is another one"),
+    (
+        "state",
+        "the machine's state is another one, or a held machine has come to rest: then it is `at_rest`",
+    ),
     (
         "job",
         "what became of a job, its summary, and where the machine stands",

@@ -6,7 +6,7 @@ use std::sync::atomic::Ordering::Relaxed;
 
 use tandem_gcode::Interpreter;
 use tandem_host::Command;
-use tandem_rings::{MachineState, Status};
+use tandem_rings::Status;
 use tandem_sdk::{AxisVector, Block};
 
 use super::desk::{Books, Desk, From, Inner, Mode, Order};
@@ -254,8 +254,7 @@ impl Desk {
 
     /// Whether the axes still move.
     pub fn moves(&self) -> bool {
-        let state = MachineState::from_number(self.status.state.load(Relaxed));
-        state != MachineState::Standstill && self.status.feed_mm_per_s.load() != 0.0
+        !self.hub.is_at_rest()
     }
 
     /// Looks at lines and at what is true between them.

@@ -36,6 +36,8 @@ pub struct OperatorHub {
 #[derive(Debug)]
 struct Latest {
     position: AxisVector,
+    /// Nothing has moved in the period of that position, as far as it is known.
+    rests: bool,
     sigma: f64,
     progress: f64,
     /// Line on which the program waits for the operator.
@@ -53,6 +55,7 @@ impl OperatorHub {
     pub fn new(machine: &Machine, controls: Arc<Controls>, status: Arc<Status>) -> Self {
         let latest = Latest {
             position: machine.start,
+            rests: true,
             sigma: 1.0,
             progress: 0.0,
             waits_on_line: None,
@@ -162,19 +165,16 @@ impl OperatorHub {
     pub fn begin_job(&self) {
         let mut latest = self.latest();
         (latest.fault, latest.stopped, latest.waits_on_line) = (None, None, None);
-        (
-            latest.waits_for_reset,
-            latest.ended,
-            latest.progress,
-            latest.sigma,
-        ) = (false, false, 0.0, 1.0);
+        (latest.waits_for_reset, latest.ended, latest.rests) = (false, false, true);
+        (latest.progress, latest.sigma) = (0.0, 1.0);
         drop(latest);
         self.go_on.store(false, Release);
     }
 
     /// The machine stands at `position`, mm or rad, though no sample says so. Host.
     pub fn stands_at(&self, position: &AxisVector) {
-        self.latest().position = *position;
+        let mut latest = self.latest();
+        (latest.position, latest.rests) = (*position, true);
     }
 
     /// Where the machine is by the last sample, mm or rad.
@@ -212,6 +212,7 @@ impl OperatorHub {
     pub fn sample(&self, sample: &Sample, progress: f64) {
         let mut latest = self.latest();
         (latest.position, latest.sigma, latest.progress) = (sample.command, sample.sigma, progress);
+        latest.rests = sample.feed_mm_per_s == 0.0 && sample.state != MachineState::Stopping;
     }
 
     /// What the policy script did until now. Host; allocates.
@@ -248,6 +249,27 @@ impl OperatorHub {
         ]
         .iter()
         .any(|s| s.load(Relaxed))
+    }
+
+    /// Whether all axes stand, where [`OperatorHub::position`] says.
+    pub fn is_at_rest(&self) -> bool {
+        self.rests_as_of(&self.latest())
+    }
+
+    /// Whether the fine loop stands, and what was seen of it is as new: samples come some periods later than its word.
+    fn rests_as_of(&self, latest: &Latest) -> bool {
+        let status = &self.status;
+        let stands = match MachineState::from_number(status.state.load(Relaxed)) {
+            // What was fed last says nothing of these.
+            MachineState::Standstill | MachineState::Fault | MachineState::Disabled => true,
+            // Off the path, which is fed no more.
+            MachineState::Stopping => false,
+            // A drive that homes by itself moves though nothing is fed.
+            MachineState::Running | MachineState::Holding | MachineState::Starved => {
+                status.feed_mm_per_s.load() == 0.0 && !drive_states::is_homing(status)
+            }
+        };
+        stands && latest.rests
     }
 
     /// The line on which the program waits, if it does.
@@ -291,6 +313,7 @@ impl OperatorHub {
             } else {
                 status.feed_mm_per_s.load() * 60.0
             },
+            at_rest: latest.ended || self.rests_as_of(&latest),
             sigma: latest.sigma,
             feed_override: controls.feed_override.load(),
             rapid_override: controls.rapid_override.load(),

@@ -21,6 +21,8 @@ pub struct StatusLine {
     pub position: Position,
     /// Path speed, mm/min.
     pub feed_mm_per_min: f64,
+    /// Whether all axes stand; while a hold, an abort or a fault still brings them to rest they do not.
+    pub at_rest: bool,
     /// Rate of program time.
     pub sigma: f64,
     /// Feed override, 1 for the programmed feed.

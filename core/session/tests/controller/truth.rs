@@ -5,9 +5,11 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 use tandem_machine::Machine;
+use tandem_rig::Random;
 use tandem_session::controller::NoKeeper;
 use tandem_state::{Change, Outcome, Owner, Store};
 
+use crate::scale::from_environment;
 use crate::support::{Kept, Says, Told, examples, machine, machine_with};
 
 /// Two seconds, then #500, then two seconds.
@@ -399,4 +401,58 @@ fn parameters_of_the_policy_script_are_set_where_it_knows_them_and_last() {
             .count(),
         1
     );
+}
+
+/// Who reads `at_rest` reads a place where the machine stays, whatever has stopped it: not while it slows down, nor as long as what
+/// is shown is older than the rest.
+#[test]
+fn a_machine_that_is_said_to_rest_stays_where_it_is_shown() {
+    let seed = from_environment("TANDEM_SEED", 1.0) as u64;
+    let mut random = Random::new(seed);
+    let stops = [
+        ("hold", json!({})),
+        ("abort", json!({})),
+        ("emergency-stop", json!({})),
+        ("jog", json!({ "stop": true })),
+    ];
+    for (stop, with) in stops {
+        for _ in 0..3 {
+            let mut says = Says::new();
+            if stop == "jog" {
+                let jog = json!({ "axis": "x", "distance_mm": 90.0, "feed_mm_per_min": 6000.0 });
+                says.ask(1000, "jog", jog);
+            } else {
+                says.ask(1000, "mdi", json!({ "line": "G1 X90 F6000" }));
+            }
+            says.ask(200 + random.below(300), stop, with.clone());
+            let asked: Vec<_> = (0..300).map(|_| says.ask(1, "status", json!({}))).collect();
+            let mill = machine("mill-3axis.toml");
+            let told = Told::by(&mill, says, |_| (), Box::new(NoKeeper));
+            let shown: Vec<_> = asked
+                .iter()
+                .map(|id| told.ok(*id))
+                .map(|status| {
+                    let place = status["position"]["x_mm"].as_f64().unwrap();
+                    (status["at_rest"] == true, place)
+                })
+                .collect();
+            let rest = shown.iter().position(|(rests, _)| *rests).unwrap();
+            // 100 mm/s are gone after a tenth of a second.
+            assert!(
+                (90..150).contains(&rest),
+                "{stop}, TANDEM_SEED={seed}: {rest}"
+            );
+            let place = shown[rest];
+            let moved = shown[rest..].iter().find(|seen| **seen != place);
+            assert_eq!(
+                moved, None,
+                "{stop}, TANDEM_SEED={seed}: it rests at {place:?}"
+            );
+            let held = told.events("state").into_iter();
+            let held = held.filter(|told| told["state"] == "held");
+            let words: Vec<_> = held.map(|told| told["at_rest"] == true).collect();
+            let expected: &[bool] = if stop == "hold" { &[false, true] } else { &[] };
+            assert_eq!(words, expected, "{stop}");
+        }
+    }
 }
