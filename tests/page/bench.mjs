@@ -20,8 +20,11 @@ export function check(holds, words) {
 // Nothing has gone wrong in a page.
 export const clean = (page) => check(page.errors.length === 0, page.errors.join("\n"));
 
+// How long a busy computer may take for anything.
+const PATIENCE_MS = 120000;
+
 // Waits for what has to come at last; how long it takes decides nothing.
-export async function until(words, look, ms = 20000, every = 10) {
+export async function until(words, look, ms = PATIENCE_MS, every = 10) {
   const end = Date.now() + ms;
   for (;;) {
     const found = await look();
@@ -111,14 +114,13 @@ export async function inside(machine, act, more = ["--programs", "examples/progr
 // Waits until as many fine periods have passed for the machine.
 export async function passes(watch, periods) {
   const from = (await watch.ask("status")).tick;
-  await until("time passes for the machine", async () => (await watch.ask("status")).tick > from + periods, 60000);
+  await until("time passes for the machine", async () => (await watch.ask("status")).tick > from + periods);
 }
 
 // A page of the controller, once it shows the machine; `before` runs in it before anything else.
 export async function open(browser, link, { before, ...options } = {}) {
   const context = await browser.newContext({ viewport: { width: 1280, height: 800 }, ...options });
-  // A busy computer takes its time.
-  context.setDefaultTimeout(120000);
+  context.setDefaultTimeout(PATIENCE_MS);
   if (before) await context.addInitScript(before);
   const page = await context.newPage();
   const errors = [];
@@ -133,7 +135,11 @@ export async function ready(page) {
   await page.waitForFunction(() => window.tandem && window.tandem.status && window.tandem.described);
 }
 
+// Takes control. The controller may not have heard yet that the page before a reload is gone: then a second press takes it over.
 export async function take(page) {
+  await page.click("#lease");
+  await page.waitForFunction(() => window.tandem.hasLease || document.getElementById("lease").dataset.how === "take-over");
+  if (await page.evaluate(() => window.tandem.hasLease)) return;
   await page.click("#lease");
   await page.waitForFunction(() => window.tandem.hasLease);
 }
