@@ -1,8 +1,7 @@
 //! A controller on the computer's clock, and its clients over real sockets: what waits for a disk keeps nobody waiting who stops the
-//! machine, clients that hang, lie or flood hurt nobody, and a token lets a client do what it is for.
+//! machine, and clients that hang, lie or flood hurt nobody.
 
 use std::io::{BufRead, BufReader, Read, Write};
-use std::net::TcpStream;
 use std::os::unix::net::UnixStream;
 use std::path::Path;
 use std::process::{Child, ChildStdout, Command, Stdio};
@@ -18,13 +17,12 @@ use tandem_sdk::{
     local_plugin,
 };
 use tandem_session::controller::{Controller, Keeper, NoKeeper, Options, ScriptLine};
-use tandem_session::operator::Role;
 use tandem_state::Change;
 
 use crate::support::{machine, machine_with, registry};
 
 /// An answer that does not come is a failure after this; nothing else depends on it.
-const NEVER: Duration = Duration::from_mins(1);
+pub const NEVER: Duration = Duration::from_mins(1);
 
 /// A disk that takes nothing until it is let go.
 #[derive(Clone, Default)]
@@ -137,20 +135,20 @@ impl Client<UnixStream> {
         client.until_state("ready");
         client
     }
-
-    pub fn until_state(&mut self, state: &str) {
-        while self.ok("status", json!({}))["state"] != state {
-            std::thread::yield_now();
-        }
-    }
 }
 
 impl<S: Read + Write> Client<S> {
-    fn over(stream: S) -> Self {
+    pub fn over(stream: S) -> Self {
         Self {
             lines: BufReader::new(stream),
             next: 1,
             aside: vec![],
+        }
+    }
+
+    pub fn until_state(&mut self, state: &str) {
+        while self.ok("status", json!({}))["state"] != state {
+            std::thread::yield_now();
         }
     }
 
@@ -198,7 +196,7 @@ impl<S: Read + Write> Client<S> {
         answer["ok"].clone()
     }
 
-    fn why(&mut self, request: &str, with: Value) -> String {
+    pub fn why(&mut self, request: &str, with: Value) -> String {
         let answer = self.ask(request, with);
         let why = answer["error"]["why"].as_str();
         why.unwrap_or_else(|| panic!("{request}: {answer}"))
@@ -717,99 +715,4 @@ fn what_has_come_is_repeated_to_the_bit() {
         .map(|number| number.parse().unwrap())
         .collect();
     assert_eq!(place, [5.0, 10.0]);
-}
-
-#[test]
-fn a_token_lets_a_client_do_what_it_is_for() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = |name: &str| folder.path().join(name);
-    let (all, operate, watch) = (file("all"), file("operate"), file("watch"));
-    let token = |path: &Path| std::fs::read_to_string(path).unwrap().trim().to_string();
-    with_controller(
-        &machine("mill-3axis.toml"),
-        Box::new(NoKeeper),
-        |options| {
-            options.listen.tcp = Some("127.0.0.1:0".parse().unwrap());
-            options.listen.token_file = Some(all.clone());
-            options.listen.role_token_files = vec![
-                (operate.clone(), Role::Operate),
-                (watch.clone(), Role::Watch),
-            ];
-        },
-        |socket, address| {
-            let come = |token: &str| {
-                let stream = TcpStream::connect(address.unwrap()).unwrap();
-                stream.set_read_timeout(Some(NEVER)).unwrap();
-                let mut client = Client::over(stream);
-                client.say("token", json!({ "token": token }));
-                let greeting = client.hear();
-                (client, greeting)
-            };
-            let (_, refused) = come("0123456789abcdef0123456789abcdef");
-            assert!(
-                refused["error"]["why"]
-                    .as_str()
-                    .unwrap()
-                    .contains("another token")
-            );
-            Client::in_control(socket).ok("lease", json!({ "how": "release" }));
-
-            let (mut watcher, greeting) = come(&token(&watch));
-            assert_eq!(greeting["tandem"]["role"], "watch");
-            watcher.ok("status", json!({}));
-            watcher.ok("emergency-stop", json!({}));
-            for (request, with) in [
-                ("lease", json!({ "how": "take" })),
-                ("lease", json!({ "how": "take-over" })),
-                ("reset", json!({})),
-                ("mdi", json!({ "line": "G0 X1" })),
-                ("set-offset", json!({ "x_mm": 1.0 })),
-            ] {
-                let why = watcher.why(request, with);
-                assert!(why.contains("this client may watch"), "{request}: {why}");
-            }
-
-            let (mut operator, greeting) = come(&token(&operate));
-            assert_eq!(greeting["tandem"]["role"], "operate");
-            operator.ok("lease", json!({ "how": "take" }));
-            operator.ok("reset", json!({}));
-            for (request, with) in [
-                ("set-offset", json!({ "x_mm": 1.0 })),
-                ("set-parameter", json!({ "number": 500, "value": 1.0 })),
-                ("touch-off", json!({ "x_mm": 1.0 })),
-            ] {
-                let why = operator.why(request, with);
-                assert!(why.contains("only be asked by who may set-up"), "{why}");
-            }
-            operator.ok("lease", json!({ "how": "release" }));
-
-            let (mut owner, greeting) = come(&token(&all));
-            assert_eq!(greeting["tandem"]["role"], "set-up");
-            owner.ok("lease", json!({ "how": "take" }));
-            owner.ok("set-offset", json!({ "x_mm": 1.0 }));
-            // It may step down, is greeted once more, and never comes up again.
-            owner.ok("role", json!({ "as": "operate" }));
-            assert_eq!(owner.hear()["tandem"]["role"], "operate");
-            assert!(
-                owner
-                    .why("set-offset", json!({ "x_mm": 2.0 }))
-                    .contains("may operate")
-            );
-            owner.ok("role", json!({ "as": "watch" }));
-            assert_eq!(
-                owner.wait(|told| told.get("tandem").is_some())["tandem"]["role"],
-                "watch"
-            );
-            assert!(
-                owner
-                    .why("role", json!({ "as": "operate" }))
-                    .contains("never widened")
-            );
-            assert!(
-                owner
-                    .why("mdi", json!({ "line": "G0 X1" }))
-                    .contains("may watch")
-            );
-        },
-    );
 }

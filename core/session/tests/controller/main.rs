@@ -9,6 +9,7 @@ mod scale;
 mod seeing;
 mod stopped;
 mod support;
+mod tokens;
 mod truth;
 mod watched;
 
