@@ -144,3 +144,18 @@ pub struct Status {
     /// What was counted so far.
     pub counts: Counts,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn state_and_code_of_a_joint_are_read_as_they_were_stored() {
+        let status = JointStatus::default();
+        assert_eq!(status.load(), (JointState(0), 0));
+        for (state, code) in [(3, 0x8611), (u32::MAX, 1), (7, u32::MAX)] {
+            status.store(JointState(state), code);
+            assert_eq!(status.load(), (JointState(state), code));
+        }
+    }
+}

@@ -49,3 +49,45 @@ impl Default for OperatorInputs {
         Self::of(&Controls::default())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_input_is_that_of_its_own_key() {
+        let nothing = OperatorInputs::default();
+        assert_eq!((nothing.feed_override, nothing.rapid_override), (1.0, 1.0));
+        let controls = Controls::default();
+        controls.feed_override.store(0.5);
+        controls.rapid_override.store(0.25);
+        let slowed = OperatorInputs {
+            feed_override: 0.5,
+            rapid_override: 0.25,
+            ..nothing
+        };
+        assert_eq!(OperatorInputs::of(&controls), slowed);
+        let keys = [
+            &controls.hold,
+            &controls.program_hold,
+            &controls.optional_stop,
+            &controls.single_block,
+            &controls.emergency_stop,
+            &controls.abort,
+        ];
+        for (number, key) in keys.iter().enumerate() {
+            key.store(true, Relaxed);
+            let seen = OperatorInputs::of(&controls);
+            let seen = [
+                seen.hold,
+                seen.program_hold,
+                seen.optional_stop,
+                seen.single_block,
+                seen.emergency_stop,
+                seen.abort,
+            ];
+            assert_eq!(seen, std::array::from_fn(|other| other == number));
+            key.store(false, Relaxed);
+        }
+    }
+}

@@ -344,6 +344,89 @@ mod tests {
     }
 
     #[test]
+    fn the_fastest_place_of_a_segment_counts_wherever_it_is() {
+        let mut depth = QueueDepth::new(0.01, 0.001, 1.0);
+        // From rest over 50 mm/s in the middle to rest, within half a second.
+        let mut segment = level(0.0, 100.0);
+        segment.duration_s = 0.5;
+        (segment.path[2], segment.path[3]) = (200.0, -800.0 / 3.0);
+        depth.push(&segment, 0.5);
+        assert!((depth.required_s() - (0.5 / STOP_SHARE + 0.02)).abs() < 1e-9);
+    }
+
+    /// A segment that leaves this deceleration, which is built up in this time, s.
+    fn built_up(segment: Segment, ramp_s: f64) -> Segment {
+        Segment {
+            max_sigma_rate_per_s: ramp_s,
+            max_sigma_acceleration_per_s2: 1.0,
+            ..segment
+        }
+    }
+
+    #[test]
+    fn what_is_passed_no_longer_counts_and_what_builds_a_deceleration_up_does() {
+        let mut depth = QueueDepth::new(0.01, 0.001, 1.0);
+        depth.push(&built_up(level(50.0, 100.0), 0.16), 1.0);
+        depth.push(&built_up(level(20.0, 1000.0), 0.04), 2.0);
+        let first_s = 0.5 / STOP_SHARE + 0.16 / STOP_JERK_SHARE + 0.02;
+        assert!((depth.required_s() - first_s).abs() < 1e-12);
+        assert_eq!((depth.stop_s(), depth.stop_ramp_s()), (0.5, 0.16));
+        depth.passed(1.5);
+        assert_eq!((depth.stop_s(), depth.stop_ramp_s()), (0.02, 0.04));
+        assert_eq!(depth.stop_deceleration_mm_per_s2(), 1000.0);
+        depth.passed(2.5);
+        assert_eq!((depth.stop_s(), depth.stop_ramp_s()), (f64::INFINITY, 0.0));
+    }
+
+    /// Pieces of 2 ms at 50 mm/s that leave 100 mm/s²; the last one as it is changed.
+    fn even(pieces: u32, last: impl Fn(&mut Segment)) -> QueueDepth {
+        let mut depth = QueueDepth::new(0.01, 0.001, 1.0);
+        for piece in 1..=pieces {
+            let mut segment = level(50.0, 100.0);
+            (segment.duration_s, segment.flags) = (0.002, SegmentFlags::default());
+            if piece == pieces {
+                last(&mut segment);
+            }
+            depth.push(&segment, f64::from(piece) * 0.002);
+        }
+        depth
+    }
+
+    #[test]
+    fn a_rest_inside_the_ring_is_a_stop_that_the_plan_makes() {
+        let rate = even(20, |_| ()).rate_for_wall(0.0, 0.04);
+        assert!(rate < 0.5, "{rate}");
+        let rests = even(20, |last| last.flags = SegmentFlags::ENDS_AT_REST);
+        assert_eq!(rests.rate_for_wall(0.0, 0.04), 1.0);
+    }
+
+    /// The rate r at which `r²/(2·0.95)` is what 2 per s brake away of the 0.4 s, less `r` times what passes before.
+    #[test]
+    fn a_deceleration_that_takes_time_to_build_up_lowers_the_rate_that_a_full_ring_allows() {
+        let at_once = even(200, |_| ()).rate_for_wall(0.0, 0.4);
+        assert_eq!(at_once, 1.0);
+        let slow = even(200, |last| *last = built_up(*last, 0.08));
+        let before_s = 0.033 + 2.0 * 0.08 / STOP_JERK_SHARE;
+        let half = 2.0 * STOP_SHARE * before_s;
+        let expected = (half * half + 4.0 * STOP_SHARE * 0.4).sqrt() - half;
+        let rate = slow.rate_for_wall(0.0, 0.4);
+        assert!((rate - expected).abs() < 0.01, "{rate}, not {expected}");
+    }
+
+    #[test]
+    fn a_queue_that_leaves_nothing_to_brake_with_is_still_driven_out_of() {
+        let mut depth = QueueDepth::new(0.01, 0.001, 1.0);
+        depth.push(
+            &Segment {
+                flags: SegmentFlags::default(),
+                ..level(50.0, 0.0)
+            },
+            1.0,
+        );
+        assert_eq!(depth.rate_for_wall(0.0, 1.0), MIN_RATE);
+    }
+
+    #[test]
     fn more_entries_than_a_period_has_time_for_slow_program_time_until_they_are_passed() {
         let mut depth = QueueDepth::new(0.01, 0.001, 1.0);
         depth.push(&level(50.0, 100.0), 1.0);

@@ -238,5 +238,10 @@ mod tests {
         );
         gathering.accepted(&block(0.0, 1e6));
         assert_eq!(gathering.at_feed_s, 0.1, "a dwell has no feed");
+        gathering.accepted(&Block {
+            dwell_s: 0.25,
+            ..block(0.0, 50.0)
+        });
+        assert_eq!(gathering.at_feed_s, 0.35, "a dwell takes its time");
     }
 }

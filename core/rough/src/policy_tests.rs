@@ -42,6 +42,8 @@ impl BlockPolicy for Recorder {
     fn tuned(&mut self, index: usize, block: &Block, _curve: Option<Curve<'_>>) -> Option<Block> {
         Some(Block {
             feed_cap_mm_per_s: index as f64,
+            path_tolerance_mm: 0.25,
+            time_constant_s: 0.5,
             line: 999,
             ..*block
         })
@@ -68,7 +70,7 @@ fn tuned(script: Vec<Result<Vec<Item>, String>>) -> (Tuned<Script, Recorder>, Se
 /// Everything that comes, until the source is dry or refuses.
 fn drain(source: &mut impl Source) -> (Vec<Item>, Option<String>) {
     let mut items = vec![];
-    loop {
+    for _ in 0..1000 {
         let before = items.len();
         match source.next_items(&mut items) {
             Ok(false) if items.len() == before => return (items, None),
@@ -76,6 +78,7 @@ fn drain(source: &mut impl Source) -> (Vec<Item>, Option<String>) {
             Err(error) => return (items, Some(error)),
         }
     }
+    panic!("it says that there is more, and never gives it");
 }
 
 fn windows(seen: &Seen) -> Vec<(usize, Option<u64>)> {
@@ -101,11 +104,16 @@ fn windows_are_full_whatever_comes_at_once() {
             [(64, Some(64)), (64, Some(128)), (22, None)],
             "{at_once} at once"
         );
-        let caps = items
-            .iter()
-            .map(|item| block_of(item).0)
-            .map(|b| (b.index, b.feed_cap_mm_per_s, b.line));
-        let expected = all.iter().map(|i| (*i, (*i % 64) as f64, 1));
+        let caps = items.iter().map(|item| block_of(item).0).map(|b| {
+            (
+                b.index,
+                b.feed_cap_mm_per_s,
+                b.path_tolerance_mm,
+                b.time_constant_s,
+                b.line,
+            )
+        });
+        let expected = all.iter().map(|i| (*i, (*i % 64) as f64, 0.25, 0.5, 1));
         assert!(
             caps.eq(expected) && error.is_none(),
             "only what a policy may change has changed"
@@ -136,6 +144,19 @@ fn a_stretch_ends_a_window_and_nothing_behind_it_is_asked_for() {
 fn nothing_for_now_ends_a_window() {
     let (mut source, seen) = tuned(vec![Ok(vec![block(0)]), Ok(vec![]), Ok(vec![block(1)])]);
     drain(&mut source);
+    assert_eq!(windows(&seen), [(1, None), (1, None)]);
+}
+
+#[test]
+fn what_waits_until_all_is_driven_ends_a_window() {
+    let mut script = Script::of(vec![Ok(vec![block(0)]), Ok(vec![block(1)])]);
+    script.waits_for_rest = true;
+    let recorder = Recorder::default();
+    let seen = Arc::clone(&recorder.seen);
+    let mut source = Tuned::new(script, recorder);
+    for _ in 0..2 {
+        assert_eq!(source.next_items(&mut vec![]), Ok(true));
+    }
     assert_eq!(windows(&seen), [(1, None), (1, None)]);
 }
 

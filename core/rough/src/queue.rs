@@ -311,3 +311,7 @@ fn is_sound(segment: &Segment) -> bool {
         && segment.duration_s.is_finite()
         && segment.duration_s >= 0.0
 }
+
+#[cfg(test)]
+#[path = "queue_tests.rs"]
+mod tests;

@@ -215,7 +215,9 @@ fn what_a_sender_has_sent_is_driven_as_far_as_it_is_known_before_its_end_is_plan
     let mut rough = RoughLoop::new(config, Box::new(sender), planner, rough);
     let mut now_s = 0.0;
     let whole_s = LINES as f64 * BLOCK_S;
+    let mut ahead_s = 0.0;
     while !finished.load(Relaxed) {
+        ahead_s = rough.queue.emitted_s() - now_s;
         rough.step(&mut ()).unwrap();
         // What is queued is driven, once there is as much as a stop asks for: two rough periods.
         if rough.queue.emitted_s() - now_s >= 2.0 * ROUGH_PERIOD_S {
@@ -224,6 +226,8 @@ fn what_a_sender_has_sent_is_driven_as_far_as_it_is_known_before_its_end_is_plan
         }
         assert!(now_s < whole_s, "the end is never planned");
     }
+    // Its end is planned while as much is queued as a stop asks for.
+    assert!(ahead_s >= 2.0 * ROUGH_PERIOD_S - 1e-9, "{ahead_s} s");
     // All but what depends on what follows, and no more left in the queue than a stop asks for and one period.
     assert!(
         now_s >= whole_s - (1.0 + 2.0 + 1.0) * ROUGH_PERIOD_S - 1e-9,

@@ -97,3 +97,119 @@ impl Source for Stream {
         rest.cause != RestCause::Abort
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tandem_gcode::{Config, ProbeInput, Program, check};
+    use tandem_sdk::{Axes, AxisVector, StopOn};
+
+    fn rest(cause: RestCause, x_mm: f64) -> Rest {
+        Rest {
+            epoch: 0,
+            cause,
+            tick: 0,
+            block: 0,
+            line: 1,
+            stop_on: StopOn::default(),
+            position: AxisVector::from_slice(&[x_mm]),
+            latch: None,
+            program_time_s: 0.0,
+            path_mm: 0.0,
+        }
+    }
+
+    fn stream(text: &'static [u8]) -> Stream {
+        let mut config = Config::new(Axes::new(&[('X', false)]).unwrap());
+        config.probe = Some(ProbeInput {
+            input: 0,
+            inverted: false,
+        });
+        let mut program = Program::spool("part.ngc", text).unwrap();
+        let report = check(&mut program, &config, &mut |_block, _curve| Ok(())).unwrap();
+        assert!(report.is_ok());
+        Stream::new(program, &config).unwrap()
+    }
+
+    fn is_block(item: &Item) -> bool {
+        matches!(item, Item::Block(..))
+    }
+
+    /// The next block of a source.
+    fn next_block(source: &mut impl Source) -> tandem_sdk::Block {
+        let mut items = vec![];
+        for _ in 0..100 {
+            source.next_items(&mut items).unwrap();
+            if let Some(Item::Block(block, _)) = items.drain(..).find(is_block) {
+                return block;
+            }
+        }
+        panic!("no block comes");
+    }
+
+    #[test]
+    fn a_program_is_over_at_an_abort_and_goes_on_from_every_other_rest() {
+        for (cause, goes_on) in [
+            (RestCause::Abort, false),
+            (RestCause::Corrected, true),
+            (RestCause::Attached, true),
+        ] {
+            let mut stream = stream(b"G1 F600 X10\nG1 X20\nM2\n");
+            assert_eq!(next_block(&mut stream).end[0], 10.0);
+            assert_eq!(stream.provide_rest(&rest(cause, 7.0)), goes_on, "{cause:?}");
+            assert_eq!(next_block(&mut stream).start[0], 7.0, "{cause:?}");
+        }
+        let mut stream = stream(b"G31 F600 X10\nG1 X20\nM2\n");
+        assert_eq!(next_block(&mut stream).end[0], 10.0);
+        assert!(stream.provide_rest(&rest(RestCause::Edge, 3.0)));
+        assert_eq!(next_block(&mut stream).start[0], 3.0);
+    }
+
+    /// A source that differs from what a source does by default in every method.
+    #[derive(Default)]
+    struct Waits {
+        periods: u32,
+        input: f64,
+    }
+
+    impl Source for Waits {
+        fn next_items(&mut self, _items: &mut Vec<Item>) -> Result<bool, String> {
+            Ok(true)
+        }
+        fn may_go_on(&mut self, driven: bool) -> bool {
+            driven
+        }
+        fn streams(&self) -> bool {
+            true
+        }
+        fn period(&mut self) {
+            self.periods += 1;
+        }
+        fn is_waiting(&self) -> bool {
+            self.periods > 0
+        }
+        fn provide_input(&mut self, value: f64) {
+            self.input = value;
+        }
+        fn provide_rest(&mut self, _rest: &Rest) -> bool {
+            self.input > 0.0
+        }
+    }
+
+    #[test]
+    fn a_source_on_the_heap_is_asked_everything() {
+        fn ask(source: &mut impl Source) {
+            assert!(source.streams() && !source.is_waiting());
+            source.period();
+            assert!(source.is_waiting());
+            assert!(source.may_go_on(true) && !source.may_go_on(false));
+            assert!(!source.provide_rest(&rest(RestCause::Abort, 0.0)));
+            source.provide_input(1.0);
+            assert!(source.provide_rest(&rest(RestCause::Abort, 0.0)));
+            assert_eq!(source.next_items(&mut vec![]), Ok(true));
+        }
+        ask(&mut Waits::default());
+        let mut on_heap: Box<dyn Source> = Box::<Waits>::default();
+        ask(&mut on_heap);
+    }
+}
