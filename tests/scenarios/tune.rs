@@ -50,6 +50,34 @@ fn tune(folder: &Path, arguments: &[&str]) -> Output {
     tandem(&[&of_all, arguments].concat())
 }
 
+/// `tandem batch submit` of a program in `folder`.
+fn submit(folder: &Path, name: &str, arguments: &[&str]) {
+    let (machine, program) = (machine(), program(name));
+    let of_all = [
+        "batch",
+        "submit",
+        folder.to_str().unwrap(),
+        "--machine",
+        machine.to_str().unwrap(),
+        "--programs",
+        &program,
+    ];
+    let submitted = tandem(&[&of_all, arguments].concat());
+    assert!(submitted.status.success(), "{}", text(&submitted.stderr));
+}
+
+/// `tandem batch collect` of `folder` into a table.
+fn collect_into(table: &Path, folder: &Path) {
+    let collected = tandem(&[
+        "batch",
+        "collect",
+        folder.to_str().unwrap(),
+        "--sqlite",
+        table.to_str().unwrap(),
+    ]);
+    assert!(collected.status.success(), "{}", text(&collected.stderr));
+}
+
 /// The lines but those that name files.
 fn found(output: &Output) -> String {
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
@@ -74,22 +102,12 @@ fn rows(csv: &Path) -> Vec<BTreeMap<String, String>> {
 fn tune_finds_what_a_grid_of_400_has_as_its_best_within_one_percent_in_60_settings() {
     let folder = tempfile::tempdir().unwrap();
     let (grid, own) = (folder.path().join("grid"), folder.path().join("own"));
-    let (machine, corners) = (machine(), program("corners"));
-    let submitted = tandem(&[
-        "batch",
-        "submit",
-        grid.to_str().unwrap(),
-        "--machine",
-        machine.to_str().unwrap(),
-        "--programs",
-        &corners,
-        "--local",
-        "--vary",
-        &format!("{TOLERANCE}:20"),
-        "--vary",
-        &format!("{SHARE}:20"),
-    ]);
-    assert!(submitted.status.success(), "{}", text(&submitted.stderr));
+    let (tolerance, share) = (format!("{TOLERANCE}:20"), format!("{SHARE}:20"));
+    submit(
+        &grid,
+        "corners",
+        &["--local", "--vary", &tolerance, "--vary", &share],
+    );
     let rows = rows(&grid.join("results.csv"));
     assert_eq!(rows.len(), 400);
     let number = |row: &BTreeMap<String, String>, key: &str| row[key].parse::<f64>().unwrap();
@@ -129,7 +147,7 @@ fn tune_finds_what_a_grid_of_400_has_as_its_best_within_one_percent_in_60_settin
         let summary = folder.path().join("summary.json");
         let run = tandem(&[
             "run",
-            &corners,
+            &program("corners"),
             "--machine",
             apply.to_str().unwrap(),
             "--summary",
@@ -207,24 +225,9 @@ fn the_same_seed_finds_the_same_on_any_number_of_threads_and_after_a_kill() {
 fn workers_that_are_killed_lose_nothing_and_record_nothing_twice() {
     let folder = tempfile::tempdir().unwrap();
     let (whole, shared) = (folder.path().join("whole"), folder.path().join("shared"));
-    let (machine, square) = (machine(), program("square"));
-    let submit = |to: &Path, more: &[&str]| {
-        let all = [
-            "batch",
-            "submit",
-            to.to_str().unwrap(),
-            "--machine",
-            machine.to_str().unwrap(),
-            "--programs",
-            &square,
-            "--vary",
-            "motion.path_tolerance_mm=0.005..0.05:60",
-        ];
-        let output = tandem(&[&all, more].concat());
-        assert!(output.status.success(), "{}", text(&output.stderr));
-    };
-    submit(&whole, &["--local"]);
-    submit(&shared, &[]);
+    let varied = ["--vary", "motion.path_tolerance_mm=0.005..0.05:60"];
+    submit(&whole, "square", &[&varied[..], &["--local"]].concat());
+    submit(&shared, "square", &varied);
     let status = |to: &Path| tandem(&["batch", "status", to.to_str().unwrap()]);
     assert_eq!(status(&shared).status.code(), Some(3));
     let worker = |part: &str| {
@@ -273,14 +276,7 @@ fn workers_that_are_killed_lose_nothing_and_record_nothing_twice() {
         .collect();
     assert_eq!(expected.len(), 60);
     assert_eq!(expected, found);
-    let collect = tandem(&[
-        "batch",
-        "collect",
-        shared.to_str().unwrap(),
-        "--sqlite",
-        folder.path().join("r.sqlite").to_str().unwrap(),
-    ]);
-    assert!(collect.status.success(), "{}", text(&collect.stderr));
+    collect_into(&folder.path().join("r.sqlite"), &shared);
     assert_eq!(
         fs::read(whole.join("results.csv")).unwrap(),
         fs::read(shared.join("results.csv")).unwrap()
@@ -310,29 +306,18 @@ fn python(script: &str, arguments: &[&str]) -> Option<String> {
 fn duckdb_and_sqlite_read_the_table() {
     let folder = tempfile::tempdir().unwrap();
     let own = folder.path().join("own");
-    let (machine, corners) = (machine(), program("corners"));
-    let submitted = tandem(&[
-        "batch",
-        "submit",
-        own.to_str().unwrap(),
-        "--machine",
-        machine.to_str().unwrap(),
-        "--programs",
-        &corners,
-        "--vary",
-        "motion.path_tolerance_mm=0.005,0.0125,0.02",
-        "--local",
-    ]);
-    assert!(submitted.status.success(), "{}", text(&submitted.stderr));
+    let corners = program("corners");
+    submit(
+        &own,
+        "corners",
+        &[
+            "--vary",
+            "motion.path_tolerance_mm=0.005,0.0125,0.02",
+            "--local",
+        ],
+    );
     let (csv, sqlite) = (own.join("results.csv"), own.join("results.sqlite"));
-    let collected = tandem(&[
-        "batch",
-        "collect",
-        own.to_str().unwrap(),
-        "--sqlite",
-        sqlite.to_str().unwrap(),
-    ]);
-    assert!(collected.status.success(), "{}", text(&collected.stderr));
+    collect_into(&sqlite, &own);
     let rows = rows(&csv);
     let number = |row: &BTreeMap<String, String>, key: &str| row[key].parse::<f64>().unwrap();
     let kept = rows
@@ -374,18 +359,7 @@ fn duckdb_and_sqlite_read_the_table() {
 fn another_build_that_gives_other_results_is_told() {
     let folder = tempfile::tempdir().unwrap();
     let own = folder.path().join("own");
-    let (machine, corners) = (machine(), program("corners"));
-    let submitted = tandem(&[
-        "batch",
-        "submit",
-        own.to_str().unwrap(),
-        "--machine",
-        machine.to_str().unwrap(),
-        "--programs",
-        &corners,
-        "--local",
-    ]);
-    assert!(submitted.status.success(), "{}", text(&submitted.stderr));
+    submit(&own, "corners", &["--local"]);
     let (name, bytes) = results(&own).into_iter().next().unwrap();
     let other = text(&bytes).replace("\"binary\":\"", "\"binary\":\"0");
     let copy = own.join("results").join(format!("0{name}"));

@@ -4,10 +4,10 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Mutex};
 
 use tandem_gcode::Item;
-use tandem_rings::Rest;
+use tandem_rings::{Rest, RestCause};
 use tandem_sdk::{
-    Accepted, Advanced, AxisVector, Block, BlockKind, Curve, Edge, Planner, PlannerDescription,
-    PluginError, SegmentSink, StopOn,
+    Accepted, Advanced, AxisVector, Block, BlockKind, BlockReport, Curve, Edge, LimitedBy,
+    MAX_AXES, Planner, PlannerDescription, PluginError, SegmentSink, StopOn,
 };
 
 use crate::Source;
@@ -148,4 +148,33 @@ pub fn probe(index: u64) -> Item {
         },
         None,
     )
+}
+
+/// The report of a block that the feed limits.
+pub fn report(block: u64) -> BlockReport {
+    BlockReport {
+        limited_by: LimitedBy::Feed,
+        block,
+        start_feed_mm_per_s: 0.0,
+        peak_feed_mm_per_s: 1.0,
+        end_feed_mm_per_s: 0.0,
+        time_s: 1.0,
+        time_constant_s: 0.0,
+    }
+}
+
+/// A rest away from where motion began.
+pub fn rest(cause: RestCause) -> Rest {
+    Rest {
+        epoch: 0,
+        cause,
+        tick: 7,
+        block: 1,
+        line: 3,
+        stop_on: StopOn::default(),
+        position: AxisVector([1.5; MAX_AXES]),
+        latch: None,
+        program_time_s: 0.25,
+        path_mm: 40.0,
+    }
 }

@@ -3,9 +3,9 @@
 use std::sync::{Arc, Mutex};
 
 use super::*;
-use crate::doubles::{Script, block, probe};
+use crate::doubles::{Script, block, probe, rest};
 use tandem_gcode::{Input, InputMode, InputWait};
-use tandem_sdk::{AxisVector, Curve, Event, EventKind, StopOn};
+use tandem_sdk::{Curve, Event, EventKind};
 
 /// What a policy was shown: blocks of each window by their index, and the block behind it.
 type Seen = Arc<Mutex<Vec<(Vec<u64>, Option<u64>)>>>;
@@ -177,19 +177,7 @@ fn an_abort_drops_the_blocks_of_windows_to_come() {
         Ok(vec![block(100)]),
     ]);
     source.next_items(&mut vec![]).unwrap();
-    let rest = Rest {
-        epoch: 0,
-        cause: RestCause::Abort,
-        tick: 0,
-        block: 0,
-        line: 1,
-        stop_on: StopOn::default(),
-        position: AxisVector::ZERO,
-        latch: None,
-        program_time_s: 0.0,
-        path_mm: 0.0,
-    };
-    assert!(source.provide_rest(&rest));
+    assert!(source.provide_rest(&rest(RestCause::Abort)));
     let (items, _) = drain(&mut source);
     assert_eq!(
         (items.len(), windows(&seen)),

@@ -1,10 +1,10 @@
 //! What the ring is given, and what the fine loop is told with it.
 
 use tandem_rings::{FineEnd, RestCause, Sizes, bridge};
-use tandem_sdk::{AxisVector, Curve, LimitedBy};
+use tandem_sdk::{AxisVector, Curve};
 
 use super::*;
-use crate::doubles::block_of;
+use crate::doubles::{block_of, report, rest};
 use crate::seams::ROUNDING;
 
 const PERIOD_S: f64 = 0.01;
@@ -23,18 +23,6 @@ fn moving(block: u64, duration_s: f64) -> Segment {
     (segment.coefficients[0][1], segment.path[1]) = (50.0, 50.0);
     segment.stop_deceleration_mm_per_s2 = 100.0;
     segment
-}
-
-fn report(block: u64) -> BlockReport {
-    BlockReport {
-        limited_by: LimitedBy::Feed,
-        block,
-        start_feed_mm_per_s: 0.0,
-        peak_feed_mm_per_s: 1.0,
-        end_feed_mm_per_s: 0.0,
-        time_s: 1.0,
-        time_constant_s: 0.0,
-    }
 }
 
 /// The segment that the fine loop takes next.
@@ -106,18 +94,7 @@ fn nothing_of_the_epoch_before_marks_what_comes_after_a_rest() {
     let second = next(&mut fine);
     assert!(second.flags.contains(SegmentFlags::STEPS));
     assert_eq!(second.stop_on.edge, Edge::Rising);
-    let rest = Rest {
-        epoch: 0,
-        cause: RestCause::Abort,
-        tick: 0,
-        block: 1,
-        line: 1,
-        stop_on: StopOn::default(),
-        position: AxisVector::ZERO,
-        latch: None,
-        program_time_s: 0.7,
-        path_mm: 30.0,
-    };
+    let rest = rest(RestCause::Abort);
     queue.restart(&rest);
     for number in 0..3 {
         queue.accepted(&block_of(number), None);
@@ -126,7 +103,7 @@ fn nothing_of_the_epoch_before_marks_what_comes_after_a_rest() {
     queue.block(&report(0));
     queue.flush(false, false);
     let first = next(&mut fine);
-    assert_eq!((first.epoch, first.path[0]), (1, 30.0));
+    assert_eq!((first.epoch, first.path[0]), (1, rest.path_mm));
     assert!(
         !first.flags.contains(SegmentFlags::STEPS),
         "it begins at rest"

@@ -101,23 +101,9 @@ impl Source for Stream {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::doubles::rest;
     use tandem_gcode::{Config, ProbeInput, Program, check};
-    use tandem_sdk::{Axes, AxisVector, StopOn};
-
-    fn rest(cause: RestCause, x_mm: f64) -> Rest {
-        Rest {
-            epoch: 0,
-            cause,
-            tick: 0,
-            block: 0,
-            line: 1,
-            stop_on: StopOn::default(),
-            position: AxisVector::from_slice(&[x_mm]),
-            latch: None,
-            program_time_s: 0.0,
-            path_mm: 0.0,
-        }
-    }
+    use tandem_sdk::Axes;
 
     fn stream(text: &'static [u8]) -> Stream {
         let mut config = Config::new(Axes::new(&[('X', false)]).unwrap());
@@ -156,13 +142,13 @@ mod tests {
         ] {
             let mut stream = stream(b"G1 F600 X10\nG1 X20\nM2\n");
             assert_eq!(next_block(&mut stream).end[0], 10.0);
-            assert_eq!(stream.provide_rest(&rest(cause, 7.0)), goes_on, "{cause:?}");
-            assert_eq!(next_block(&mut stream).start[0], 7.0, "{cause:?}");
+            assert_eq!(stream.provide_rest(&rest(cause)), goes_on, "{cause:?}");
+            assert_eq!(next_block(&mut stream).start[0], 1.5, "{cause:?}");
         }
         let mut stream = stream(b"G31 F600 X10\nG1 X20\nM2\n");
         assert_eq!(next_block(&mut stream).end[0], 10.0);
-        assert!(stream.provide_rest(&rest(RestCause::Edge, 3.0)));
-        assert_eq!(next_block(&mut stream).start[0], 3.0);
+        assert!(stream.provide_rest(&rest(RestCause::Edge)));
+        assert_eq!(next_block(&mut stream).start[0], 1.5);
     }
 
     /// A source that differs from what a source does by default in every method.
@@ -203,9 +189,9 @@ mod tests {
             source.period();
             assert!(source.is_waiting());
             assert!(source.may_go_on(true) && !source.may_go_on(false));
-            assert!(!source.provide_rest(&rest(RestCause::Abort, 0.0)));
+            assert!(!source.provide_rest(&rest(RestCause::Abort)));
             source.provide_input(1.0);
-            assert!(source.provide_rest(&rest(RestCause::Abort, 0.0)));
+            assert!(source.provide_rest(&rest(RestCause::Abort)));
             assert_eq!(source.next_items(&mut vec![]), Ok(true));
         }
         ask(&mut Waits::default());

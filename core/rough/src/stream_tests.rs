@@ -5,14 +5,16 @@ use std::sync::{Arc, Mutex};
 use tandem_gcode::{Input, InputMode, InputWait, Item};
 use tandem_rings::{FineEnd, HostEnd, Queued, Rest, RestCause, Sizes, bridge};
 use tandem_sdk::{
-    Accepted, AxisVector, Block, BlockKind, BlockReport, Curve, Edge, Event, EventKind, LimitedBy,
-    Segment, SegmentFlags, SegmentSink, StopOn,
+    Accepted, AxisVector, Block, BlockKind, BlockReport, Curve, Edge, Event, EventKind, Segment,
+    SegmentFlags, SegmentSink, StopOn,
 };
 
 use std::sync::atomic::Ordering::Relaxed;
 
 use super::*;
-use crate::doubles::{Answer, Fake, Plans, ROUGH_PERIOD_S, Script, block, block_of, probe};
+use crate::doubles::{
+    Answer, Fake, Plans, ROUGH_PERIOD_S, Script, block, block_of, probe, report, rest,
+};
 
 /// Program time of each block, s, and the path that it is long, mm.
 const BLOCK_S: f64 = 0.02;
@@ -62,18 +64,6 @@ impl Plans for Pieces {
     fn reset(&mut self, position: &AxisVector) {
         (self.held, self.finished, self.path_mm) = (vec![], false, 0.0);
         self.resets.lock().unwrap().push(*position);
-    }
-}
-
-fn report(block: u64) -> BlockReport {
-    BlockReport {
-        limited_by: LimitedBy::Feed,
-        block,
-        start_feed_mm_per_s: 0.0,
-        peak_feed_mm_per_s: 1.0,
-        end_feed_mm_per_s: 0.0,
-        time_s: BLOCK_S,
-        time_constant_s: 0.0,
     }
 }
 
@@ -185,21 +175,6 @@ impl Rig {
             }
         };
         self.driven.iter().map(short).collect()
-    }
-}
-
-fn rest(cause: RestCause) -> Rest {
-    Rest {
-        epoch: 0,
-        cause,
-        tick: 7,
-        block: 1,
-        line: 3,
-        stop_on: StopOn::default(),
-        position: AxisVector([1.5; tandem_sdk::MAX_AXES]),
-        latch: None,
-        program_time_s: 0.25,
-        path_mm: 40.0,
     }
 }
 

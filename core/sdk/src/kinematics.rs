@@ -18,6 +18,34 @@ impl KinematicsContext {
     pub fn new(axes: Axes) -> Self {
         Self { axes }
     }
+
+    /// The places of the linear axes whose letters the option `key` states. Host; allocates where it refuses.
+    ///
+    /// # Errors
+    /// A letter that the machine does not have, that is one of an axis that turns, or that is named twice.
+    pub fn linear_axes<const N: usize>(
+        &self,
+        key: &str,
+        letters: [char; N],
+    ) -> Result<[usize; N], PluginError> {
+        let mut found = [0; N];
+        for (place, letter) in letters.into_iter().enumerate() {
+            if letters[..place].contains(&letter) {
+                return Err(PluginError::of_option(
+                    key,
+                    format!("{letter} is named twice"),
+                ));
+            }
+            let axis = self
+                .axes
+                .index(letter.to_ascii_uppercase())
+                .filter(|axis| !self.axes.is_rotary(*axis));
+            found[place] = axis.ok_or_else(|| {
+                PluginError::of_option(key, format!("the machine has no linear axis {letter}"))
+            })?;
+        }
+        Ok(found)
+    }
 }
 
 /// The map between axes (what the program speaks of) and joints (what the drives move).

@@ -43,25 +43,8 @@ impl CoreXy {
     /// # Errors
     /// An axis that the machine does not have, that turns, or is named twice.
     pub fn new(options: &Options, context: &KinematicsContext) -> Result<Self, PluginError> {
-        let [x, y] = options.axes;
-        let index = |letter: char| {
-            let found = context
-                .axes
-                .index(letter.to_ascii_uppercase())
-                .filter(|axis| !context.axes.is_rotary(*axis));
-            found.ok_or_else(|| {
-                PluginError::of_option("axes", format!("the machine has no linear axis {letter}"))
-            })
-        };
-        if x == y {
-            return Err(PluginError::of_option(
-                "axes",
-                format!("{x} is named twice"),
-            ));
-        }
-        Ok(Self {
-            axes: [index(x)?, index(y)?],
-        })
+        let axes = context.linear_axes("axes", options.axes)?;
+        Ok(Self { axes })
     }
 }
 

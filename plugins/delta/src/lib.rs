@@ -58,19 +58,7 @@ impl Delta {
     /// # Errors
     /// An axis that the machine does not have, that turns, or is named twice; rods that do not reach the middle.
     pub fn new(options: &Options, context: &KinematicsContext) -> Result<Self, PluginError> {
-        let [x, y, z] = options.axes;
-        let index = |letter: char| {
-            let found = context
-                .axes
-                .index(letter.to_ascii_uppercase())
-                .filter(|axis| !context.axes.is_rotary(*axis));
-            let words = || format!("the machine has no linear axis {letter}");
-            found.ok_or_else(|| PluginError::of_option("axes", words()))
-        };
-        if x == y || y == z || z == x {
-            let words = format!("{x}, {y}, {z}: one is named twice");
-            return Err(PluginError::of_option("axes", words));
-        }
+        let axes = context.linear_axes("axes", options.axes)?;
         let (rod_mm, radius_mm) = (options.rod_mm, options.radius_mm);
         if !(1e-3..=1e6).contains(&radius_mm) {
             let words = format!("{radius_mm}: must be 0.001 to 1000000");
@@ -85,7 +73,7 @@ impl Delta {
             [radius_mm * cos, radius_mm * sin]
         };
         Ok(Self {
-            axes: [index(x)?, index(y)?, index(z)?],
+            axes,
             rod_mm,
             columns_mm: std::array::from_fn(column),
             missed: AtomicBool::new(false),

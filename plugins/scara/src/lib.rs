@@ -79,21 +79,7 @@ impl Scara {
     /// # Errors
     /// An axis that the machine does not have, that turns, or is named twice; a link of no length.
     pub fn new(options: &Options, context: &KinematicsContext) -> Result<Self, PluginError> {
-        let [x, y] = options.axes;
-        let index = |letter: char| {
-            let found = context
-                .axes
-                .index(letter.to_ascii_uppercase())
-                .filter(|axis| !context.axes.is_rotary(*axis));
-            let words = || format!("the machine has no linear axis {letter}");
-            found.ok_or_else(|| PluginError::of_option("axes", words()))
-        };
-        if x == y {
-            return Err(PluginError::of_option(
-                "axes",
-                format!("{x} is named twice"),
-            ));
-        }
+        let axes = context.linear_axes("axes", options.axes)?;
         let links = [
             ("upper_arm_mm", options.upper_arm_mm),
             ("forearm_mm", options.forearm_mm),
@@ -105,7 +91,7 @@ impl Scara {
             }
         }
         Ok(Self {
-            axes: [index(x)?, index(y)?],
+            axes,
             upper_mm: options.upper_arm_mm,
             fore_mm: options.forearm_mm,
             shoulder_mm: options.shoulder_mm,

@@ -47,16 +47,7 @@ impl WrappedRotary {
     /// # Errors
     /// An axis that the machine does not have, or that turns by itself; a radius of nothing.
     pub fn new(options: &Options, context: &KinematicsContext) -> Result<Self, PluginError> {
-        let found = context
-            .axes
-            .index(options.axis.to_ascii_uppercase())
-            .filter(|axis| !context.axes.is_rotary(*axis));
-        let Some(axis) = found else {
-            return Err(PluginError::of_option(
-                "axis",
-                format!("the machine has no linear axis {}", options.axis),
-            ));
-        };
+        let [axis] = context.linear_axes("axis", [options.axis])?;
         let radius_mm = options.radius_mm;
         if !(1e-3..=1e6).contains(&radius_mm.abs()) {
             return Err(PluginError::of_option(
