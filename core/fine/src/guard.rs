@@ -389,6 +389,63 @@ mod tests {
         );
     }
 
+    /// A guard at this place of the first axis, with this jerk limit.
+    fn jerk_guard(at_mm: f64, jerk_mm_per_s3: f64) -> Guard {
+        let mut config = guard().config;
+        config.order = 3;
+        config.position[0] = at_mm;
+        for axis in &mut config.limits.axes {
+            axis.jerk_mm_per_s3 = jerk_mm_per_s3;
+        }
+        Guard::new(&config)
+    }
+
+    #[test]
+    fn jerk_beyond_the_limit_is_counted_while_it_is_relaxed_and_a_breach_afterwards() {
+        let relaxed = |before: u32| {
+            let mut guard = jerk_guard(0.0, 1000.0);
+            guard.relax_jerk();
+            let mut at = AxisVector::ZERO;
+            for _ in 0..before {
+                assert!(guard.check(&at, 0).breach.is_none());
+                guard.sent(&at);
+            }
+            // From rest to 0.1 mm/s in a period: 100 mm/s² at once, a hundred times the jerk.
+            at[0] += 1e-4;
+            guard.check(&at, 0)
+        };
+        for before in 0..RELAXED_SAMPLES {
+            let checked = relaxed(before);
+            assert!(checked.relaxed && checked.breach.is_none(), "{before}");
+        }
+        let checked = relaxed(RELAXED_SAMPLES);
+        assert!(!checked.relaxed);
+        assert!(matches!(
+            checked.breach,
+            Some(FaultKind::Guard {
+                breach: Breach::Jerk,
+                axis: 0,
+                limit: 1000.0,
+                ..
+            })
+        ));
+    }
+
+    /// Far from the origin the last bit of a position is more jerk than a slow machine may have.
+    #[test]
+    fn the_rounding_of_a_place_is_no_jerk() {
+        let at_mm = 400.0f64;
+        let mut guard = jerk_guard(at_mm, 1e-5);
+        for period in 0..40 {
+            let place = [at_mm, at_mm.next_up()][usize::from(period % 3 == 0)];
+            let at = AxisVector::from_slice(&[place]);
+            assert!(guard.check(&at, 0).breach.is_none(), "{period}");
+            guard.sent(&at);
+        }
+        let at = AxisVector::from_slice(&[at_mm + 1e-9]);
+        assert!(guard.check(&at, 0).breach.is_some());
+    }
+
     #[test]
     fn a_sample_that_is_refused_leaves_nothing_behind() {
         let (mut plain, mut tempted) = (guard(), guard());

@@ -169,6 +169,54 @@ mod tests {
         }
     }
 
+    /// With a jerk of 1 and a change of 2 at most: a rate of 10 takes 2 to the full change and back, and 5 at the mean of it.
+    #[test]
+    fn a_stop_takes_as_long_as_its_ramps_and_what_is_held_between_them() {
+        for (rate, change, expected_s) in [
+            (10.0, 0.0, 7.0),
+            (-10.0, 0.0, 7.0),
+            // Rising: first that is brought to nothing, by when the rate is 10.5.
+            (10.0, 1.0, 1.0 + 7.25),
+            // Falling already: a second of that stop is over.
+            (10.0, -1.0, 7.25 - 1.0),
+            // So low that the full change is not reached.
+            (1.0, 0.0, 2.0),
+            // Falling so fast that it goes below nothing, to 1.9, and comes back.
+            (0.1, -2.0, 2.0 + 2.0 * 1.9f64.sqrt()),
+        ] {
+            let found_s = stop_s(rate, change, 2.0, 1.0);
+            assert!(
+                (found_s - expected_s).abs() < 1e-12,
+                "{rate} {change}: {found_s} s"
+            );
+        }
+    }
+
+    /// A stop falls as it rises, so that its way is its time at the mean of both speeds.
+    #[test]
+    fn the_way_to_a_speed_is_that_of_its_ramps_and_what_is_held_between_them() {
+        for (acceleration, end_mm_per_s, expected_mm) in [
+            (0.0, 0.0, 7.0 * 5.0),
+            (0.0, 4.0, 5.0 * 7.0),
+            // A second in which it still gets faster, to 10.5 mm/s.
+            (1.0, 0.0, 10.0 + 1.0 / 2.0 - 1.0 / 6.0 + 7.25 * 5.25),
+            // That stop, less its first second.
+            (-1.0, 0.0, 7.25 * 5.25 - (10.5 - 1.0 / 6.0)),
+        ] {
+            let way_mm = Along {
+                speed_mm_per_s: 10.0,
+                acceleration_mm_per_s2: acceleration,
+                max_mm_per_s2: 2.0,
+                jerk_mm_per_s3: 1.0,
+            }
+            .way_to_mm(end_mm_per_s);
+            assert!(
+                (way_mm - expected_mm).abs() < 1e-9,
+                "{acceleration} to {end_mm_per_s}: {way_mm} mm"
+            );
+        }
+    }
+
     #[test]
     fn what_leaves_nothing_to_brake_with_asks_for_the_end_speed_and_what_does_not_move_for_none() {
         assert_eq!(along(5.0, 0.0).speed_towards(1.0, 2.0, 1e-3), 2.0);

@@ -231,6 +231,12 @@ mod tests {
             (Some(0.02), None)
         );
         assert_eq!(changed, [false, false, true]);
+        let capped = InForce {
+            feed_cap_mm_per_s: 30.0,
+            ..rapid
+        };
+        let (tuning, changed) = Bounds::default().apply(&[f64::NAN, f64::NAN, 20.0], &capped);
+        assert_eq!((tuning.feed_cap_mm_per_s, changed[2]), (None, true));
         let dwell = InForce {
             kind: BlockKind::Dwell,
             ..LINE
