@@ -10,7 +10,8 @@ use super::compare::Move;
 /// What is said of a program that the judge does not end: some loops within repeats in subroutines keep it going for ever.
 pub const NEVER_ENDS: &str = "the judge does not end";
 const NO_END: &str = "File ended with no percent sign";
-const GIVE_UP_MS: u32 = 4000;
+/// Processor time after which a program is taken to have no end, in hundredths of a second: a busy computer makes none endless.
+const GIVE_UP_TICKS: u64 = 300;
 /// Without a configuration its tool table is in inches.
 const INCH_MM: f64 = 25.4;
 
@@ -122,18 +123,15 @@ pub fn judged(
         .stdout(File::create(&calls).unwrap())
         .stderr(File::create(&messages).unwrap());
     let mut running = command.spawn().map_err(|e| e.to_string())?;
-    for waited_ms in (0..).step_by(10) {
-        if running.try_wait().map_err(|e| e.to_string())?.is_some() {
-            break;
-        }
-        if waited_ms > GIVE_UP_MS {
+    while running.try_wait().map_err(|e| e.to_string())?.is_none() {
+        if ticks_used(running.id()) > GIVE_UP_TICKS {
             running
                 .kill()
                 .and_then(|()| running.wait())
                 .map_err(|e| e.to_string())?;
             return Err(NEVER_ENDS.to_owned());
         }
-        std::thread::sleep(Duration::from_millis(10));
+        std::thread::sleep(Duration::from_millis(2));
     }
     let text = |path| String::from_utf8_lossy(&std::fs::read(path).unwrap()).into_owned();
     let calls = text(&calls);
@@ -143,6 +141,15 @@ pub fn judged(
         return Err(messages.lines().skip(1).collect::<Vec<_>>().join(" | "));
     }
     Ok(read(&calls))
+}
+
+/// What a process has used of its processors, user time, as the kernel counts it.
+fn ticks_used(process: u32) -> u64 {
+    let stat = std::fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
+    // The name, which may hold anything, stands in parentheses before.
+    let behind_name = stat.rsplit_once(')').map_or("", |(_, behind)| behind);
+    let user = behind_name.split_whitespace().nth(11);
+    user.and_then(|ticks| ticks.parse().ok()).unwrap_or(0)
 }
 
 fn read(text: &str) -> Vec<Move> {

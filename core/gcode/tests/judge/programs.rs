@@ -246,9 +246,12 @@ pub fn with_subprograms(seed: u64) -> String {
             writer.line("#1 = [[#1 * 3 + 1] MOD 7]");
             if number < count {
                 let called = number + 1 + writer.below(count - number);
-                // The judge takes L0 in a subprogram for a call, from which the next M99 returns.
+                // The judge takes L0 in a subprogram for a call, from which the next M99 returns; and it wants L to be whole in
+                // lines, too, that it only passes over while it looks for a subprogram.
                 let none = if number == 0 { " L0" } else { "" };
-                let times = writer.random.pick(&["", " L2", none, " L[1 + [#1 MOD 2]]"]);
+                let times = writer
+                    .random
+                    .pick(&["", " L2", none, " L[1 + [FIX[#1] MOD 2]]"]);
                 writer.line(&format!("M98 P{}{times}", 100 + called));
             }
         }
