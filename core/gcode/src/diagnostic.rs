@@ -83,6 +83,7 @@ impl Diagnostic {
 
     /// The error in `line`, or in the line before it that `error` names.
     pub(crate) fn new(file: &Arc<str>, line: u32, text: &[u8], error: LineError) -> Self {
+        let error = error.into_details();
         let (line, text) = error
             .line
             .as_ref()

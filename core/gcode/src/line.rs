@@ -180,6 +180,7 @@ impl Line<'_> {
         if !machine && (self.state.coordinates.is_rotated() || self.words.polar.is_some()) {
             return self.advance_in_plane(absolute);
         }
+        let mut moved = 0;
         for axis in 0..self.letters.count() {
             let Some(value) = self.words.get(self.letters.letter(axis)) else {
                 continue;
@@ -191,11 +192,9 @@ impl Line<'_> {
                 _ => self.state.path.position[axis],
             };
             self.state.path.position[axis] = base + value;
-            if absolute {
-                self.state.path.uncertain &= !(1 << axis);
-            }
-            self.assume_target(axis, machine, absolute);
+            moved |= 1 << axis;
         }
+        self.assume_target(moved, machine, absolute);
         self.state.path.moved = true;
     }
 
@@ -233,21 +232,20 @@ impl Line<'_> {
         self.state.path.moved = true;
     }
 
-    /// Whether the programmed position of `axis` now follows from what the first pass has assumed.
+    /// Whether the programmed positions of the axes `moved`, bit per axis, now follow from what the first pass has assumed.
     #[inline]
-    fn assume_target(&mut self, axis: usize, machine: bool, absolute: bool) {
-        let bit = 1 << axis;
+    fn assume_target(&mut self, moved: u32, machine: bool, absolute: bool) {
         let path = &mut self.state.path;
         let base = match (machine, absolute) {
             (true, _) => 0,
             (_, true) => self.state.coordinates.assumed,
             _ => path.assumed,
         };
-        path.assumed &= !bit;
-        if self.reads_assumed.get() {
-            path.assumed |= bit;
+        let read = if self.reads_assumed.get() { moved } else { 0 };
+        path.assumed = path.assumed & !moved | base & moved | read;
+        if absolute {
+            path.uncertain &= !moved;
         }
-        path.assumed |= base & bit;
     }
 
     #[inline]

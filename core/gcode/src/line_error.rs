@@ -18,9 +18,14 @@ impl Span {
     }
 }
 
-/// An error with its place in the line.
+/// An error with its place in the line. Results that hold one are returned for each word of each line, and hardly ever are
+/// errors: so it is one pointer.
 #[derive(Debug)]
-pub(crate) struct LineError {
+pub(crate) struct LineError(Box<Details>);
+
+/// What an error says.
+#[derive(Debug)]
+pub(crate) struct Details {
     pub span: Span,
     pub code: &'static str,
     pub message: String,
@@ -38,14 +43,33 @@ pub(crate) struct SourceLine {
 }
 
 impl LineError {
+    #[cold]
     pub fn new(span: Span, code: &'static str, message: impl Into<String>) -> Self {
-        Self {
+        Self(Box::new(Details {
             span,
             code,
             message: message.into(),
             line: None,
             sketch: None,
-        }
+        }))
+    }
+
+    pub fn into_details(self) -> Details {
+        *self.0
+    }
+}
+
+impl std::ops::Deref for LineError {
+    type Target = Details;
+
+    fn deref(&self) -> &Details {
+        &self.0
+    }
+}
+
+impl std::ops::DerefMut for LineError {
+    fn deref_mut(&mut self) -> &mut Details {
+        &mut self.0
     }
 }
 

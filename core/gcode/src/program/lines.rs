@@ -213,7 +213,7 @@ impl Lines {
         };
         let filled = program.read_at(offset, &mut chunk.text)?;
         chunk.last = filled < CHUNK;
-        let newline = chunk.text[..filled].iter().rposition(|b| *b == b'\n');
+        let newline = memchr::memrchr(b'\n', &chunk.text[..filled]);
         chunk.end = if chunk.last {
             filled
         } else {
@@ -303,7 +303,7 @@ impl Lines {
 /// ends). A chunk without any line end is a piece of a line that is too long.
 #[inline]
 fn piece(chunk: &Chunk, at: usize) -> (std::ops::Range<usize>, usize, bool) {
-    let newline = chunk.text[at..chunk.end].iter().position(|b| *b == b'\n');
+    let newline = memchr::memchr(b'\n', &chunk.text[at..chunk.end]);
     let to = newline.map_or(chunk.end, |length| at + length);
     let after = (to + 1).min(chunk.end);
     let length = if chunk.text[at..to].ends_with(b"\r") {

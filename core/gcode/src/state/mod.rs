@@ -128,21 +128,18 @@ impl State {
     /// The block that comes next, at rest where the last one ended, with all that is in force.
     #[inline]
     pub fn blank_block(&self) -> Block {
-        Block {
-            path_mode: if self.modes.exact_stop {
-                PathMode::ExactStop
-            } else {
-                PathMode::Continuous
-            },
-            line: self.line,
-            index: self.path.next_index,
-            time_constant_s: self.modes.time_constant_s,
-            path_tolerance_mm: self.modes.tolerance_mm,
-            offset: *self.coordinates.total(),
-            tool: self.tools.in_spindle,
-            override_enabled: u32::from(self.permits.feed_override()),
-            spindle_rad_per_s: self.spindle.command_rad_per_s(),
-            ..Block::at(self.path.last_end)
+        let mut block = Block::at(self.path.last_end);
+        if self.modes.exact_stop {
+            block.path_mode = PathMode::ExactStop;
         }
+        block.line = self.line;
+        block.index = self.path.next_index;
+        block.time_constant_s = self.modes.time_constant_s;
+        block.path_tolerance_mm = self.modes.tolerance_mm;
+        block.offset = *self.coordinates.total();
+        block.tool = self.tools.in_spindle;
+        block.override_enabled = u32::from(self.permits.feed_override());
+        block.spindle_rad_per_s = self.spindle.command_rad_per_s();
+        block
     }
 }

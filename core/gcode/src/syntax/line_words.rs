@@ -129,11 +129,7 @@ impl LineWords {
         };
         match place.replace(value) {
             None => Ok(()),
-            Some(_) => Err(LineError::new(
-                span,
-                "word-twice",
-                format!("{} stands in this line twice", byte as char),
-            )),
+            Some(_) => Err(twice(byte, span)),
         }
     }
 
@@ -158,8 +154,7 @@ impl LineWords {
     pub fn add(&mut self, letter: u8, value: f64, span: Span) -> Checked<()> {
         let bit = 1 << index(letter);
         if self.present & bit != 0 {
-            let message = format!("{} stands in this line twice", letter as char);
-            return Err(LineError::new(span, "word-twice", message));
+            return Err(twice(letter, span));
         }
         self.present |= bit;
         self.values[index(letter)] = value;
@@ -244,4 +239,10 @@ impl LineWords {
             other => Ok(other),
         }
     }
+}
+
+#[cold]
+fn twice(byte: u8, span: Span) -> LineError {
+    let message = format!("{} stands in this line twice", byte as char);
+    LineError::new(span, "word-twice", message)
 }

@@ -27,6 +27,75 @@ pub(crate) fn starts_here(scanner: &Scanner) -> bool {
 /// No digit, a second point, or more than 64 characters.
 #[inline]
 pub(crate) fn read(scanner: &mut Scanner) -> Checked<f64> {
+    short(scanner).map_or_else(|| read_any(scanner), Ok)
+}
+
+/// The number at the cursor, where it is short and right.
+#[inline]
+fn short(scanner: &mut Scanner) -> Option<f64> {
+    let start = scanner.at();
+    let sign = scanner.peek();
+    let digit = sign.wrapping_sub(b'0');
+    if digit < 10 && !matches!(scanner.byte_at(start + 1), b'0'..=b'9' | b'.') {
+        scanner.advance(1);
+        return Some(f64::from(digit));
+    }
+    let from = start + usize::from(matches!(sign, b'+' | b'-'));
+    let (mut mantissa, whole) = few_digits(scanner.eight_at(from));
+    let mut end = from + whole;
+    let mut fraction = 0;
+    if scanner.byte_at(end) == b'.' {
+        let (below_one, count) = few_digits(scanner.eight_at(end + 1));
+        mantissa = mantissa * POWERS_OF_TEN_WHOLE[count] + below_one;
+        fraction = count;
+        end += 1 + count;
+    }
+    // Runs of eight digits may go on, and the rest is wrong.
+    if whole == EIGHT || fraction == EIGHT || whole + fraction == 0 || scanner.byte_at(end) == b'.'
+    {
+        return None;
+    }
+    scanner.advance(end - start);
+    let magnitude = mantissa.cast_signed() as f64 / POWERS_OF_TEN[fraction];
+    Some(if sign == b'-' { -magnitude } else { magnitude })
+}
+
+/// Digits that are read at a time.
+const EIGHT: usize = 8;
+const POWERS_OF_TEN_WHOLE: [u64; EIGHT + 1] = [
+    1,
+    10,
+    100,
+    1000,
+    10_000,
+    100_000,
+    1_000_000,
+    10_000_000,
+    100_000_000,
+];
+
+/// The digits at the start of `text`, of which there are at most eight here, as a number, and how many they are. `text` holds
+/// the first byte lowest.
+#[inline]
+fn few_digits(text: u64) -> (u64, usize) {
+    // Each byte becomes its digit; what is none is more than nine, and shows as the highest bit of its byte.
+    let values = text ^ 0x3030_3030_3030_3030;
+    let others = (values.wrapping_add(0x7676_7676_7676_7676) | values) & 0x8080_8080_8080_8080;
+    let count = others.trailing_zeros() as usize / 8;
+    if count == 0 {
+        return (0, 0);
+    }
+    // Set to the right with zeros before them, in pairs, then fours, then all eight.
+    let values = values << (64 - 8 * count);
+    let pairs = values.wrapping_mul(10) + (values >> 8);
+    let low = (pairs & 0x0000_00ff_0000_00ff).wrapping_mul(0x000f_4240_0000_0064);
+    let high = ((pairs >> 16) & 0x0000_00ff_0000_00ff).wrapping_mul(0x0000_2710_0000_0001);
+    (low.wrapping_add(high) >> 32, count)
+}
+
+/// Reads any number, digit by digit.
+#[cold]
+fn read_any(scanner: &mut Scanner) -> Checked<f64> {
     let text = scanner.rest();
     let signed = usize::from(matches!(text.first(), Some(b'+' | b'-')));
     let (mut mantissa, whole) = digits(&text[signed..], 0);
@@ -57,7 +126,6 @@ pub(crate) fn read(scanner: &mut Scanner) -> Checked<f64> {
 }
 
 /// The digits at the start of `text`, set behind `mantissa` (which wraps where they are too many), and how many they are.
-#[inline]
 fn digits(text: &[u8], mut mantissa: u64) -> (u64, usize) {
     let mut count = 0;
     for byte in text {
@@ -98,7 +166,7 @@ mod tests {
 
     fn number(text: &str) -> Result<f64, String> {
         let mut scanner = Scanner::new(text.as_bytes(), 0);
-        let value = read(&mut scanner).map_err(|f| f.message)?;
+        let value = read(&mut scanner).map_err(|f| f.message.clone())?;
         assert!(scanner.at_end());
         Ok(value)
     }
@@ -123,10 +191,49 @@ mod tests {
         );
     }
 
+    /// What comes behind a number, and how long the line is, changes nothing.
+    #[test]
+    fn a_number_ends_where_its_digits_end() {
+        for number in [
+            "7",
+            "-0.5",
+            "12345678",
+            "1.2345678",
+            "+1234567.1234567",
+            "123456789.5",
+            "-.0",
+        ] {
+            for behind in [
+                "",
+                "X",
+                " 1",
+                "Y-3.25Z1",
+                "/]:;@",
+                "\u{ff}9",
+                "a(1234567890)",
+            ] {
+                let text = format!("{number}{behind}");
+                let mut scanner = Scanner::new(text.as_bytes(), 0);
+                let value = read(&mut scanner).unwrap();
+                assert_eq!(
+                    value.to_bits(),
+                    number.parse::<f64>().unwrap().to_bits(),
+                    "{text}"
+                );
+                assert_eq!(scanner.at(), number.len(), "{text}");
+            }
+        }
+    }
+
     proptest! {
         #[test]
         fn every_number_is_correctly_rounded(text in r"[+-]?[0-9]{1,20}(\.[0-9]{0,20})?") {
             prop_assert_eq!(number(&text), Ok(text.parse().unwrap()));
+        }
+
+        #[test]
+        fn short_numbers_are_correctly_rounded(text in r"[+-]?[0-9]{0,9}\.[0-9]{1,9}") {
+            prop_assert_eq!(number(&text).map(f64::to_bits), Ok(text.parse::<f64>().unwrap().to_bits()));
         }
     }
 }

@@ -21,14 +21,15 @@ pub(crate) fn parse(
 ) -> Checked<()> {
     let mut scanner = Scanner::new(text, from);
     loop {
-        scanner.skip_ignorable()?;
         match scanner.peek() {
-            _ if scanner.at_end() => return Ok(()),
-            byte @ (b'@' | b'^') => polar(byte, &mut scanner, context, words)?,
-            b'#' => assignment(&mut scanner, context, words)?,
             letter @ (b'a'..=b'z' | b'A'..=b'Z') => {
                 word(letter.to_ascii_uppercase(), &mut scanner, context, words)?;
             }
+            b' ' => scanner.advance(1),
+            _ if scanner.at_end() => return Ok(()),
+            b'\t' | b'(' | b';' => scanner.skip_ignorable()?,
+            byte @ (b'@' | b'^') => polar(byte, &mut scanner, context, words)?,
+            b'#' => assignment(&mut scanner, context, words)?,
             other => return Err(unexpected(other, scanner.here())),
         }
     }
@@ -53,11 +54,7 @@ fn word(
     };
     let span = scanner.since(start);
     if value.abs() > MAX_VALUE || value.is_nan() {
-        return Err(LineError::new(
-            span,
-            "word-range",
-            format!("{} is too large a number", letter as char),
-        ));
+        return Err(too_large(letter, span));
     }
     match letter {
         b'G' => words.g.push(code('G', value, span)?),
@@ -78,13 +75,15 @@ fn polar(byte: u8, scanner: &mut Scanner, context: &Context, words: &mut LineWor
         .map_err(|error| in_word(byte, start, error))?;
     let span = scanner.since(start);
     if value.abs() > MAX_VALUE || value.is_nan() {
-        return Err(LineError::new(
-            span,
-            "word-range",
-            format!("{} is too large a number", byte as char),
-        ));
+        return Err(too_large(byte, span));
     }
     words.add_polar(byte, value, span)
+}
+
+#[cold]
+fn too_large(byte: u8, span: Span) -> LineError {
+    let message = format!("{} is too large a number", byte as char);
+    LineError::new(span, "word-range", message)
 }
 
 /// Adds which word lacks its value.
@@ -105,7 +104,19 @@ fn in_word(letter: u8, start: usize, error: LineError) -> LineError {
     )
 }
 
+#[inline]
 fn code(letter: char, value: f64, span: Span) -> Checked<Code> {
+    // Nearly all are whole.
+    let whole = value as u16;
+    if f64::from(whole) == value && whole < 1000 {
+        let tenths = whole * 10;
+        return Ok(Code { tenths, span });
+    }
+    broken_code(letter, value, span)
+}
+
+/// The code of a word as G61.1.
+fn broken_code(letter: char, value: f64, span: Span) -> Checked<Code> {
     let tenths = (value * 10.0).round();
     if (value * 10.0 - tenths).abs() > 1e-3 || !(0.0..=9999.0).contains(&tenths) {
         let message = format!("{letter}{} is not known", crate::line_error::show(value));

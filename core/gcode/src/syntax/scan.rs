@@ -37,6 +37,35 @@ impl<'t> Scanner<'t> {
             .to_ascii_uppercase()
     }
 
+    /// The byte at `at`; 0 behind the end.
+    #[inline]
+    pub fn byte_at(&self, at: usize) -> u8 {
+        self.text.get(at).copied().unwrap_or(0)
+    }
+
+    /// Eight bytes from `at` on, the first one lowest; 0 behind the end.
+    #[inline]
+    pub fn eight_at(&self, at: usize) -> u64 {
+        if let Some(eight) = self.text.get(at..).and_then(<[u8]>::first_chunk) {
+            return u64::from_le_bytes(*eight);
+        }
+        // The last eight bytes of the line, moved down.
+        match self.text.last_chunk() {
+            Some(last) if at < self.text.len() => {
+                u64::from_le_bytes(*last) >> (8 * (at + 8 - self.text.len()))
+            }
+            _ => self.few_at(at),
+        }
+    }
+
+    /// The same in a line that is shorter.
+    #[cold]
+    fn few_at(&self, at: usize) -> u64 {
+        (0..8).fold(0, |eight, i| {
+            eight | u64::from(self.byte_at(at + i)) << (8 * i)
+        })
+    }
+
     pub fn at_end(&self) -> bool {
         self.at >= self.text.len()
     }

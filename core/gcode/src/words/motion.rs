@@ -1,6 +1,6 @@
 //! G0, G1 and G80: straight lines.
 
-use tandem_sdk::{Block, BlockKind};
+use tandem_sdk::BlockKind;
 
 use super::{Action, Group, Shape, Word, compensation, lathe};
 use crate::line::Line;
@@ -90,13 +90,12 @@ pub(super) fn line_to(line: &mut Line, kind: BlockKind) -> Checked<()> {
             line.check_travel(axis, end[axis], end[axis])?;
         }
     }
-    let block = Block {
-        kind,
-        end,
-        length_mm,
-        feed_mm_per_s,
-        ..line.state.blank_block()
-    };
+    // Set field by field: what is copied from a blank one is copied in pieces that wait for each other.
+    let mut block = line.state.blank_block();
+    block.kind = kind;
+    block.end = end;
+    block.length_mm = length_mm;
+    block.feed_mm_per_s = feed_mm_per_s;
     line.push(block);
     Ok(())
 }

@@ -82,7 +82,11 @@ impl Orders {
         self.clear();
         let mut claims = Claims::default();
         let g = self.sort_kind(b'G', words.g.as_slice(), words, &mut claims);
-        let m = self.sort_kind(b'M', words.m.as_slice(), words, &mut claims);
+        let m = if words.m.as_slice().is_empty() {
+            Ok(())
+        } else {
+            self.sort_kind(b'M', words.m.as_slice(), words, &mut claims)
+        };
         let motion = self.choose_motion(words, modal, &mut claims, letters);
         g.and(m).and(motion)?;
         let foreign = words.present & AXIS_MASK & !letters.mask;
@@ -288,16 +292,22 @@ impl Claims {
     fn add(&mut self, word: &Word, words: &LineWords) -> Checked<()> {
         let both = self.letters & word.mask & words.present & !AXIS_MASK;
         self.letters |= word.mask;
-        let Some((shared, span)) = words.first_of(both) else {
+        if both == 0 {
             return Ok(());
-        };
-        let word = word.code;
-        let message = format!(
-            "{word} takes {}, but so does another word of this line: split it",
-            shared as char
-        );
-        Err(LineError::new(span, "ambiguous", message))
+        }
+        Err(ambiguous(word, both, words))
     }
+}
+
+#[cold]
+fn ambiguous(word: &Word, both: u32, words: &LineWords) -> LineError {
+    let (shared, span) = words.first_of(both).unwrap_or_default();
+    let word = word.code;
+    let message = format!(
+        "{word} takes {}, but so does another word of this line: split it",
+        shared as char
+    );
+    LineError::new(span, "ambiguous", message)
 }
 
 #[cold]
