@@ -550,6 +550,9 @@ impl Interpreter {
     fn percent(&mut self, scanner: &mut Scanner, out: &mut Vec<Item>) -> Checked<Option<usize>> {
         let start = scanner.at();
         scanner.advance(1);
+        if self.phase == Phase::Fresh {
+            skip_name(scanner);
+        }
         scanner.skip_ignorable()?;
         if !scanner.at_end() {
             return Err(LineError::new(
@@ -595,6 +598,26 @@ impl Interpreter {
             }
         }
         Ok(())
+    }
+}
+
+/// `%` on the first line may be followed by the name of the program: `%prog1`, `%_N_PART_MPF`, `%1000`, `%O1000`. What could be a
+/// word, as in `%G0`, is none.
+fn skip_name(scanner: &mut Scanner) {
+    let rest = scanner.rest().trim_ascii_start();
+    let of_name = |byte: &&u8| byte.is_ascii_alphanumeric() || matches!(byte, b'_' | b'-' | b'.');
+    let name = &rest[..rest.iter().take_while(of_name).count()];
+    let is_name = match name {
+        [b'_', ..] => true,
+        [b'O' | b'o', number @ ..] if !number.is_empty() => number.iter().all(u8::is_ascii_digit),
+        [first, second, ..] if first.is_ascii_alphabetic() => {
+            second.is_ascii_alphabetic() || *second == b'_'
+        }
+        number => number.iter().all(u8::is_ascii_digit),
+    };
+    if is_name {
+        scanner.skip_blanks();
+        scanner.advance(name.len());
     }
 }
 

@@ -113,7 +113,10 @@ impl<'t> Scanner<'t> {
             self.at += 1;
             match byte {
                 b'(' => depth += 1,
-                b')' if depth == 1 => return Ok(()),
+                b')' if depth == 1 => {
+                    self.skip_unopened();
+                    return Ok(());
+                }
                 b')' => depth -= 1,
                 _ => {}
             }
@@ -125,6 +128,13 @@ impl<'t> Scanner<'t> {
             "the comment is not closed: ) is missing"
         };
         Err(LineError::new(self.since(start), "comment", message))
+    }
+
+    /// `)` behind a comment is part of it: `(FirstOp-T1))`.
+    fn skip_unopened(&mut self) {
+        while matches!(self.peek(), b')' | b' ' | b'\t') {
+            self.at += 1;
+        }
     }
 
     /// The run of letters that comes next, at most 8, upper case, zero-padded; the cursor stays.

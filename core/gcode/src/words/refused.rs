@@ -68,6 +68,12 @@ pub(super) const WORDS: &[Word] = &[
     Word::refused("G76", Motion, "threading", CYCLES),
     Word::refused("G87", Motion, "back boring", CYCLES),
     Word::refused(
+        "M25",
+        Stop,
+        "Z to its home",
+        "controls take it for different things (on some it opens a clamp or pauses): write G53 G0 Z or G28 Z",
+    ),
+    Word::refused(
         "M29",
         Spindle,
         "rigid tapping mode",

@@ -103,6 +103,56 @@ fn text_behind_a_percent_sign_is_not_dropped_without_a_word() {
     assert!(told.starts_with(said), "{told}");
 }
 
+/// Controls write the name of the program behind the `%` that opens it.
+#[test]
+fn the_percent_sign_that_opens_a_program_may_be_followed_by_its_name() {
+    for name in [
+        "%prog1",
+        "% PART-7.nc (a)",
+        "%1000",
+        "%O0012",
+        "%_N_BOX_MPF",
+    ] {
+        let text = format!("(head)\n{name}\nG0 X1\nM2\n");
+        assert_eq!(
+            shown(&items_of(text.as_bytes()))[0],
+            "3: Rapid 0 to 1 0 0 0",
+            "{name}"
+        );
+        let open = report_of(format!("{name}\nG0 X1\n").as_bytes());
+        assert_eq!(open.diagnostics[0].code, "truncated", "{name}");
+    }
+    // What could be a word is none, and later there is no program to be named.
+    for text in [
+        "%G0 X1",
+        "%M3",
+        "%X1",
+        "%T1",
+        "G0 X1\n%prog1\n",
+        "%\nG0 X1\n%prog1\n",
+    ] {
+        assert_eq!(
+            report_of(text.as_bytes()).diagnostics[0].code,
+            "percent",
+            "{text}"
+        );
+    }
+}
+
+/// FreeCAD writes such comments where a name holds parentheses.
+#[test]
+fn parentheses_that_close_too_often_end_their_comment() {
+    for text in [
+        "(Path: FirstOp-T1))\nG0 X1",
+        "G0 (a (b))) X1",
+        "G0 X1 (a)) ) (b)",
+    ] {
+        let blocks = report_of(text.as_bytes()).blocks;
+        assert_eq!(blocks, 1, "{text}");
+    }
+    assert_eq!(report_of(b"G0 (a) X1 )").diagnostics[0].code, "unexpected");
+}
+
 #[test]
 fn a_line_of_ten_megabytes_is_one_error() {
     let mut text = b"G0 X1\n(".to_vec();
