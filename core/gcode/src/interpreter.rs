@@ -18,7 +18,7 @@ use crate::stated::{self, Unknown};
 use crate::syntax::expression::Context;
 use crate::syntax::line_words::{LineWords, Target};
 use crate::syntax::parse::{O_WORDS, parse};
-use crate::syntax::scan::Scanner;
+use crate::syntax::scan::{ABORT, Scanner};
 use crate::words::compensation::{self, Compensation};
 use crate::words::coolant::Coolant;
 use crate::words::orders::{Orders, polar_misplaced};
@@ -430,6 +430,9 @@ impl Interpreter {
             reads_assumed: &self.reads_assumed,
         };
         let parsed = parse(text, from, &context, &mut self.words);
+        if let Some(span) = self.words.abort {
+            return Err(self.abort(text, span));
+        }
         if !self.config.watched.is_empty() && parsed.is_ok() {
             self.look_for_watched(text, out);
         }
@@ -441,6 +444,17 @@ impl Interpreter {
         };
         self.state.curves.note(self.state.line, text);
         done
+    }
+
+    /// `(ABORT, …)`: the program itself says that it cannot go on, and why.
+    #[cold]
+    fn abort(&mut self, text: &[u8], span: Span) -> LineError {
+        let comment = &text[span.start as usize + 1..span.end as usize - 1];
+        let why = comment.trim_ascii_start().get(ABORT.len()..);
+        let why = self.context().expanded(why.unwrap_or_default());
+        self.state.compensation.spoil();
+        self.state.ended = true;
+        LineError::new(span, "abort", format!("the program aborts: {}", why.trim()))
     }
 
     /// What the line, which has been read, states of the names that are watched holds for its own motion already.

@@ -243,9 +243,18 @@ impl Outline {
             self.close(index, open);
             return Ok(());
         }
-        // Gives up what lies within the block that this closes, so that one mistake is one message.
         let opener =
             |entry: &Entry| keywords.contains(&entry.word.keyword) && entry.word.label == *label;
+        let place = open
+            .iter()
+            .rposition(|opened| opener(&self.entries[*opened]));
+        // A subroutine with a wrong block is told when it comes to that block: a library holds subs that nobody calls.
+        if let (Some(place), [Keyword::Sub]) = (place, keywords) {
+            self.given_up.extend(open.drain(place + 1..));
+            self.close(index, open);
+            return Ok(());
+        }
+        // Gives up what lies within the block that this closes, so that one mistake is one message.
         let error = match open.last() {
             Some(other) => self.error(
                 index,
@@ -253,10 +262,7 @@ impl Outline {
             ),
             None => self.error(index, "it closes nothing: no block is open"),
         };
-        if let Some(place) = open
-            .iter()
-            .rposition(|opened| opener(&self.entries[*opened]))
-        {
+        if let Some(place) = place {
             self.given_up.extend(open.drain(place..));
         }
         Err(error)

@@ -5,7 +5,7 @@ use std::cell::Cell;
 use super::function::{self, Operator};
 use super::number;
 use super::scan::Scanner;
-use crate::line_error::{Checked, LineError, Span};
+use crate::line_error::{Checked, LineError, Span, show};
 use crate::state::State;
 use crate::state::letters::Letters;
 use crate::state::parameters::{LAST, Parameters, Value};
@@ -84,6 +84,25 @@ impl Context<'_> {
             }
             values.push(self.assumed_value(&mut scanner)?);
         }
+    }
+
+    /// The text of a comment with the values of the parameters that it names.
+    pub fn expanded(&self, text: &[u8]) -> String {
+        let mut shown = String::new();
+        let mut rest = text;
+        while let Some(at) = rest.iter().position(|byte| *byte == b'#') {
+            shown.push_str(&String::from_utf8_lossy(&rest[..at]));
+            let mut scanner = Scanner::new(rest, at);
+            let Ok(value) = self.value(&mut scanner) else {
+                shown.push('#');
+                rest = &rest[at + 1..];
+                continue;
+            };
+            shown.push_str(&show(value));
+            rest = scanner.rest();
+        }
+        shown.push_str(&String::from_utf8_lossy(rest));
+        shown
     }
 
     fn deep_value(&self, scanner: &mut Scanner, depth: usize) -> Checked<f64> {
@@ -245,7 +264,7 @@ impl Context<'_> {
         if (number - rounded).abs() > 1e-4 || !(1.0..=LAST as f64).contains(&rounded) {
             let message = format!(
                 "there is no parameter #{}: the numbers go from 1 to {LAST}",
-                crate::line_error::show(number)
+                show(number)
             );
             return Err(LineError::new(
                 scanner.since(start),

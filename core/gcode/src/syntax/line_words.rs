@@ -95,6 +95,8 @@ pub(crate) struct LineWords {
     pub time_constant: Option<(f64, Span)>,
     pub assignments: Vec<Assignment>,
     pub names: Vec<u8>,
+    /// The comment `(ABORT, …)`, which ends the program.
+    pub abort: Option<Span>,
 }
 
 impl LineWords {
@@ -104,6 +106,7 @@ impl LineWords {
         self.m.count = 0;
         self.polar = None;
         self.time_constant = None;
+        self.abort = None;
         self.assignments.clear();
         self.names.clear();
     }

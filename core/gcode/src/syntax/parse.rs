@@ -27,7 +27,10 @@ pub(crate) fn parse(
             }
             b' ' => scanner.advance(1),
             _ if scanner.at_end() => return Ok(()),
-            b'\t' | b'(' | b';' => scanner.skip_ignorable()?,
+            b'\t' | b'(' | b';' => {
+                scanner.skip_ignorable()?;
+                words.abort = scanner.abort();
+            }
             byte @ (b'@' | b'^') => polar(byte, &mut scanner, context, words)?,
             b'#' => assignment(&mut scanner, context, words)?,
             other => return Err(unexpected(other, scanner.here())),

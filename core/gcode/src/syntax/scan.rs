@@ -6,15 +6,26 @@ use crate::line_error::{Checked, LineError, Span};
 pub(crate) struct Scanner<'t> {
     text: &'t [u8],
     at: usize,
+    /// The first comment `(ABORT, …)` that has been passed, with its parentheses.
+    abort: Option<Span>,
 }
 
 impl<'t> Scanner<'t> {
     pub fn new(text: &'t [u8], at: usize) -> Self {
-        Self { text, at }
+        Self {
+            text,
+            at,
+            abort: None,
+        }
     }
 
     pub fn at(&self) -> usize {
         self.at
+    }
+
+    /// The first comment `(ABORT, …)` that has been passed, with its parentheses.
+    pub fn abort(&self) -> Option<Span> {
+        self.abort
     }
 
     /// The rest of the line.
@@ -114,6 +125,9 @@ impl<'t> Scanner<'t> {
             match byte {
                 b'(' => depth += 1,
                 b')' if depth == 1 => {
+                    if self.abort.is_none() && aborts(&self.text[start + 1..]) {
+                        self.abort = Some(self.since(start));
+                    }
                     self.skip_unopened();
                     return Ok(());
                 }
@@ -163,4 +177,15 @@ impl<'t> Scanner<'t> {
             .count();
         Span::new(self.at, (self.at + 1 + tail).min(self.text.len()))
     }
+}
+
+/// What a comment begins with that ends the program.
+pub(crate) const ABORT: &str = "abort,";
+
+/// Whether a comment is `(ABORT, …)`.
+fn aborts(comment: &[u8]) -> bool {
+    comment
+        .trim_ascii_start()
+        .get(..ABORT.len())
+        .is_some_and(|start| start.eq_ignore_ascii_case(ABORT.as_bytes()))
 }

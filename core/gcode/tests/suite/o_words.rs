@@ -57,6 +57,44 @@ fn errors(text: &str) -> Vec<String> {
     errors_on(&mill(), text)
 }
 
+/// A library holds subroutines that nobody calls; what is wrong in one that is called is told at its line.
+#[test]
+fn a_wrong_block_of_a_subroutine_is_told_when_it_is_called() {
+    let text = "o<pick> sub\no150 if [#1 GT 0]\nG0 X1\no160 endif\no<pick> endsub\nG0 X2\n";
+    assert_eq!(path(text), "6:2");
+    assert_eq!(
+        errors(&format!("{text}o<pick> call [1]\n")),
+        ["2:1 [o-word] o150 if: it is opened and never closed; in o<pick>, called from line 7"]
+    );
+}
+
+/// LinuxCNC's `(ABORT, …)`: a subroutine that has found something wrong must not go on as if it had not.
+#[test]
+fn a_program_that_aborts_says_why() {
+    let text = "o<check> sub\no1 if [#1 GT 2]\n( Abort, #1 mm are too much for #<_current_tool>)\no1 endif\n\
+                G0 X[#1]\no<check> endsub\no<check> call [1]\no<check> call [2.5]\nG0 X9";
+    assert_eq!(
+        errors(text),
+        [
+            "3:1 [abort] the program aborts: 2.5 mm are too much for 0; in o<check>, called from line 8"
+        ]
+    );
+    assert_eq!(
+        path(
+            &text
+                .replace("2.5", "2")
+                .replace("X9", "X9 (no abort, as it does not begin so)")
+        ),
+        "5:1 5:2 9:9"
+    );
+    let depends =
+        "G38.3 Z-5 F60\no1 if [#5070 EQ 0]\n(ABORT, nothing was touched)\no1 endif\nG0 Z1";
+    assert!(
+        errors(depends).is_empty(),
+        "that is decided when it is driven"
+    );
+}
+
 #[test]
 fn branches_take_the_first_that_is_true() {
     let program = |value: u32| {
