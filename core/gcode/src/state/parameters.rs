@@ -350,6 +350,9 @@ pub(crate) fn predefined_name(name: &[u8], state: &State, letters: &Letters) -> 
         b"_value" | b"_value_returned" | b"_call_level" | b"_remap_level" => 0.0,
         // 0 in previews of LinuxCNC, which this interpreter has none of.
         b"_task" => 1.0,
+        // The LinuxCNC whose language this is.
+        b"_vmajor" => 2.9,
+        b"_vminor" => 0.0,
         b"_line" => f64::from(state.line),
         b"_motion_mode" => state.motion_code(),
         b"_plane" => match state.modes.plane {

@@ -5,16 +5,16 @@ use tandem_sdk::AxisVector;
 use super::{Action, Group, Word, nothing, tool};
 use crate::config::Tool;
 use crate::line::Line;
-use crate::line_error::Checked;
+use crate::line_error::{Checked, LineError};
 use crate::state::coordinates::SYSTEMS;
-use crate::state::letters::AXIS_MASK;
+use crate::state::letters::{AXIS_MASK, mask};
 
 pub(super) const WORDS: &[Word] = &[
     Word::new(
         "G10",
         Group::NonModal,
-        "LPRXYZABCUVW",
-        "L1, L10, L11 tool table (P tool); L2 (R rotation), L20 coordinate systems (P 1 to 9, 0 the one in force)",
+        "LPRXYZABCUVWIJQ",
+        "L1, L10, L11 tool table (P tool; I J Q of a lathe's tool have no effect); L2 (R rotation), L20 coordinate systems (P 1 to 9, 0 the one in force)",
         Action::Act(set_data),
         "G10 L2 P1 X10 R30",
     ),
@@ -194,13 +194,7 @@ fn restore_g92(line: &mut Line) -> Checked<()> {
 
 /// G92: the offset that gives the current position the named coordinates.
 fn set_position_offset(line: &mut Line) -> Checked<()> {
-    if line.words.present & AXIS_MASK == 0 {
-        return Err(line.orders.error(
-            Group::NonModal,
-            "axis-missing",
-            "G92 needs at least one axis word",
-        ));
-    }
+    needs_axes(line, "G92")?;
     let coordinates = &line.state.coordinates;
     let at = coordinates.to_program(&line.state.path.position);
     let mut g92 = *coordinates.g92();
@@ -213,12 +207,21 @@ fn set_position_offset(line: &mut Line) -> Checked<()> {
 }
 
 fn set_local_offset(line: &mut Line) -> Checked<()> {
+    needs_axes(line, "G52")?;
     let mut g92 = *line.state.coordinates.g92();
     for (axis, value) in line.named_axes() {
         g92[axis] = value;
     }
     assume_offsets(line, false);
     line.state.coordinates.set_g92(g92);
+    Ok(())
+}
+
+fn needs_axes(line: &Line, word: &str) -> Checked<()> {
+    if line.words.present & AXIS_MASK == 0 {
+        let message = format!("{word} needs at least one axis word");
+        return Err(line.orders.error(Group::NonModal, "axis-missing", message));
+    }
     Ok(())
 }
 
@@ -245,8 +248,17 @@ fn set_data(line: &mut Line) -> Checked<()> {
         Some(1) => set_tool(line, ToolOrigin::Value),
         Some(10) => set_tool(line, ToolOrigin::Position),
         Some(11) => set_tool(line, ToolOrigin::Fixture),
-        Some(2) => set_system(line),
-        Some(20) => set_system_here(line),
+        Some(which @ (2 | 20)) => {
+            if let Some((letter, span)) = line.words.first_of(mask("IJQ")) {
+                let message = format!("G10 L{which} does not take {}", letter as char);
+                return Err(LineError::new(span, "unused-word", message));
+            }
+            if which == 2 {
+                set_system(line)
+            } else {
+                set_system_here(line)
+            }
+        }
         Some(other) => {
             let message = format!(
                 "G10 L{other} is not known: L1, L10 and L11 (tools), L2 and L20 (systems) are"
@@ -414,7 +426,7 @@ fn go_to_reference(line: &mut Line, which: usize) -> Checked<()> {
 
 #[cfg(test)]
 mod tests {
-    use crate::testing::{ends, last, short};
+    use crate::testing::{ends, last, messages, short};
 
     #[test]
     fn offsets_add_up() {
@@ -458,7 +470,11 @@ mod tests {
             short(last("G10 L2 P1 X10\nG92 Y5\nG43 H2 G0 X1").offset[2]),
             "25"
         );
-        assert_eq!(ends("G10 L1 P2 Z3 R4\nG43 H2 G0 Z#5410"), [["0", "0", "3"]]);
+        assert_eq!(
+            ends("G10 L1 P2 Z3 R4 I10 J-20 Q7\nG43 H2 G0 Z#5410"),
+            [["0", "0", "3"]]
+        );
+        assert!(messages("G10 L2 P1 X1 Q3")[0].contains("L2 does not take Q"));
     }
 
     #[test]

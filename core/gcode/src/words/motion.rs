@@ -129,6 +129,20 @@ mod tests {
     }
 
     #[test]
+    fn the_word_that_ends_the_motion_mode_moves_nothing() {
+        let (items, errors) = run_on(mill(), "G0 X1\nG80 X5\nG80 G0 X2\nG80 G92 X0\nG52");
+        let found: Vec<_> = errors
+            .iter()
+            .map(|error| (error.line, error.code))
+            .collect();
+        assert_eq!(found, [(2, "motion-missing"), (5, "axis-missing")]);
+        let blocks = items
+            .iter()
+            .filter(|item| matches!(item, crate::Item::Block(..)));
+        assert_eq!(blocks.count(), 2);
+    }
+
+    #[test]
     fn polar_coordinates_stand_for_x_and_y() {
         assert_eq!(ends("G0 @10 ^30")[0], ["8.66", "5", "0"]);
         // The direction, or the distance, stays where only the other is given; with G91 both add up.

@@ -167,6 +167,10 @@ impl Orders {
                 .map_or(Ok(()), |polar| Err(polar_misplaced(&polar)))?;
             return self.check_taken(word, taker, words);
         }
+        if word.is_none() && has_axes && self.has(Group::CycleCancel) {
+            let message = "G80 ends the motion mode: axis words need a motion word beside it";
+            return Err(self.error(Group::CycleCancel, "motion-missing", message));
+        }
         let motion = word.map(MotionMode::Word).or(refused).unwrap_or(modal);
         if !begins(motion, words, word.is_some()) {
             return Ok(());

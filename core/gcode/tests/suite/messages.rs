@@ -106,7 +106,7 @@ travel.ngc:7:12: error: Z would reach 127 mm, beyond its travel of -100 to 100 m
 #[test]
 fn unknown_words() {
     let expected = "\
-unknown-word.ngc:2:7: error: nothing in this line takes the word Q (G5, G6.2, G64, G73, G83, M19, M61, M66, M67, M68, M100 would)
+unknown-word.ngc:2:7: error: nothing in this line takes the word Q (G5, G6.2, G10, G64, G73, G83, M19, M61, M66, M67, M68, M100 would)
   G0 X1 Q3
         ^^
 unknown-word.ngc:3:1: error: G123 is not known
@@ -377,7 +377,7 @@ fn one_error_does_not_cause_others() {
     assert_messages(
         "G1 G91 F60 Q1\nX1\nX1",
         &[
-            "1:12 [unused-word] nothing in this line takes the word Q (G5, G6.2, G64, G73, G83, M19, M61, M66, M67, M68, M100 would)",
+            "1:12 [unused-word] nothing in this line takes the word Q (G5, G6.2, G10, G64, G73, G83, M19, M61, M66, M67, M68, M100 would)",
         ],
     );
     assert_messages(

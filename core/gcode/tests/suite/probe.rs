@@ -200,7 +200,7 @@ fn what_does_not_go_with_a_probe_is_refused() {
         ),
         (
             "G38.2 Z-1 Q2 F10",
-            "1:11 [unused-word] nothing in this line takes the word Q (G5, G6.2, G64, G73, G83, M19, M61, M66, M67, M68, M100 would)",
+            "1:11 [unused-word] nothing in this line takes the word Q (G5, G6.2, G10, G64, G73, G83, M19, M61, M66, M67, M68, M100 would)",
         ),
     ];
     for (program, expected) in refused {
