@@ -153,6 +153,14 @@ fn ticks_used(process: u32) -> u64 {
     user.and_then(|ticks| ticks.parse().ok()).unwrap_or(0)
 }
 
+/// The call of a line: behind its number stands that of the line of the program, as long as it may be: `12 N100110STRAIGHT_FEED(…)`.
+fn name(line: &str) -> Option<&str> {
+    let (before, _) = line.split_once('(')?;
+    let behind = before.trim_start_matches(|c: char| c.is_ascii_digit() || c == ' ');
+    let number = |c: char| c.is_ascii_digit() || matches!(c, ' ' | '.');
+    Some(behind.strip_prefix('N')?.trim_start_matches(number))
+}
+
 fn read(text: &str) -> Vec<Move> {
     let mut machine = Machine {
         unit_mm: 1.0,
@@ -160,10 +168,7 @@ fn read(text: &str) -> Vec<Move> {
     };
     let mut moves = Vec::new();
     for line in text.lines() {
-        let Some(call) = line.split_whitespace().nth(2) else {
-            continue;
-        };
-        let Some((name, _)) = call.split_once('(') else {
+        let Some(name) = name(line) else {
             continue;
         };
         let inside = line
