@@ -216,21 +216,26 @@ fn open_file(program: &mut Program, label: &str, config: &Config) -> Result<usiz
             "the program calls subroutines of more than {MAX_FILES} files"
         ));
     }
-    let folders = &config.subroutine_path;
+    // The machine's own come before what lies beside the program.
+    let folders = config.subroutine_path.iter().chain(&program.folder);
     let name = format!("{label}.ngc");
-    let Some(path) = folders
-        .iter()
-        .map(|folder| folder.join(&name))
-        .find(|path| path.is_file())
-    else {
-        let shown: Vec<_> = folders
-            .iter()
-            .map(|folder| folder.display().to_string())
-            .collect();
-        let elsewhere = if shown.is_empty() {
-            "the machine file has no [program] subroutine_path for files of subroutines".to_owned()
-        } else {
-            format!("no file {name} lies in {}", shown.join(" or "))
+    let mut paths = folders.map(|folder| folder.join(&name));
+    let Some(path) = paths.find(|path| path.is_file()) else {
+        let folders = config.subroutine_path.iter();
+        let shown: Vec<_> = folders.map(|folder| folder.display().to_string()).collect();
+        let beside = program.folder.is_some();
+        let elsewhere = match (shown.is_empty(), beside) {
+            (true, false) => {
+                "the machine file has no [program] subroutine_path for files of subroutines"
+                    .to_owned()
+            }
+            (true, true) => format!(
+                "no file {name} lies beside the program, and the machine file has no [program] subroutine_path"
+            ),
+            (false, _) => {
+                let beside = if beside { " or beside the program" } else { "" };
+                format!("no file {name} lies in {}{beside}", shown.join(" or "))
+            }
         };
         return Err(format!(
             "there is no subroutine with this label in this file, and {elsewhere}"

@@ -7,7 +7,7 @@ pub(crate) mod lines;
 
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::diagnostic::Diagnostic;
@@ -56,6 +56,8 @@ pub struct Program {
     file: File,
     /// Each chunk that the first pass has read; `None` before it.
     pub(crate) chunks: Option<Vec<KnownChunk>>,
+    /// Where the file lies; `None` for text that is no file.
+    pub(crate) folder: Option<PathBuf>,
     /// Files of subroutines that the first pass has opened, with the labels that they were looked up by.
     pub(crate) subroutines: Vec<(String, Program)>,
 }
@@ -91,6 +93,7 @@ impl Program {
             name,
             file,
             chunks: None,
+            folder: path.parent().map(Path::to_path_buf),
             subroutines: Vec::new(),
         })
     }
@@ -111,6 +114,7 @@ impl Program {
             name,
             file,
             chunks: None,
+            folder: None,
             subroutines: Vec::new(),
         })
     }

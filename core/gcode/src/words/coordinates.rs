@@ -14,7 +14,7 @@ pub(super) const WORDS: &[Word] = &[
         "G10",
         Group::NonModal,
         "LPRXYZABCUVWIJQ",
-        "L1, L10, L11 tool table (P tool; I J Q of a lathe's tool have no effect); L2 (R rotation), L20 coordinate systems (P 1 to 9, 0 the one in force)",
+        "L1, L10, L11 tool table (P tool; I J Q of a lathe's tool have no effect; L0, to read it again, has none either); L2 (R rotation), L20 coordinate systems (P 1 to 9, 0 the one in force)",
         Action::Act(set_data),
         "G10 L2 P1 X10 R30",
     ),
@@ -245,23 +245,22 @@ fn assume_offsets(line: &mut Line, from_position: bool) {
 /// G10.
 fn set_data(line: &mut Line) -> Checked<()> {
     match line.words.integer(b'L', 0..=999)? {
+        // Reads the tool table again: it is what this run has made of it.
+        Some(0) => refuse_letters(line, "G10 L0", "PRXYZABCUVWIJQ"),
         Some(1) => set_tool(line, ToolOrigin::Value),
         Some(10) => set_tool(line, ToolOrigin::Position),
         Some(11) => set_tool(line, ToolOrigin::Fixture),
-        Some(which @ (2 | 20)) => {
-            if let Some((letter, span)) = line.words.first_of(mask("IJQ")) {
-                let message = format!("G10 L{which} does not take {}", letter as char);
-                return Err(LineError::new(span, "unused-word", message));
-            }
-            if which == 2 {
-                set_system(line)
-            } else {
-                set_system_here(line)
-            }
+        Some(2) => {
+            refuse_letters(line, "G10 L2", "IJQ")?;
+            set_system(line)
+        }
+        Some(20) => {
+            refuse_letters(line, "G10 L20", "IJQ")?;
+            set_system_here(line)
         }
         Some(other) => {
             let message = format!(
-                "G10 L{other} is not known: L1, L10 and L11 (tools), L2 and L20 (systems) are"
+                "G10 L{other} is not known: L0, L1, L10 and L11 (tools), L2 and L20 (systems) are"
             );
             Err(line.words.error(b'L', "refused", message))
         }
@@ -271,6 +270,14 @@ fn set_data(line: &mut Line) -> Checked<()> {
             "G10 needs L: 1, 2, 10, 11 or 20",
         )),
     }
+}
+
+fn refuse_letters(line: &Line, word: &str, letters: &str) -> Checked<()> {
+    let Some((letter, span)) = line.words.first_of(mask(letters)) else {
+        return Ok(());
+    };
+    let message = format!("{word} does not take {}", letter as char);
+    Err(LineError::new(span, "unused-word", message))
 }
 
 /// The index of the coordinate system that P names.
@@ -475,6 +482,8 @@ mod tests {
             [["0", "0", "3"]]
         );
         assert!(messages("G10 L2 P1 X1 Q3")[0].contains("L2 does not take Q"));
+        assert!(messages("G10 L0").is_empty());
+        assert!(messages("G10 L0 P1")[0].contains("L0 does not take P"));
     }
 
     #[test]

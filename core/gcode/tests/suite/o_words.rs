@@ -57,6 +57,41 @@ fn errors(text: &str) -> Vec<String> {
     errors_on(&mill(), text)
 }
 
+/// Programs lie beside the subroutines that they call, as LinuxCNC's folder of programs has them; the machine's own come first.
+#[test]
+fn a_subroutine_is_looked_up_beside_its_program() {
+    let (folder, mut config) = with_files(&[
+        ("main.ngc", "o<drill> call [3]\no<clear> call\n"),
+        ("drill.ngc", "o<drill> sub\nG0 X#1\no<drill> endsub\n"),
+        ("clear.ngc", "o<clear> sub\nG0 X8\no<clear> endsub\n"),
+    ]);
+    let (own, _) = with_files(&[("clear.ngc", "o<clear> sub\nG0 X9\no<clear> endsub\n")]);
+    let main = folder.path().join("main.ngc");
+    let ends = |config: &Config| {
+        let mut ends = Vec::new();
+        let mut program = Program::open(&main).unwrap();
+        let mut planner = |block: &tandem_sdk::Block, _: Option<tandem_sdk::Curve<'_>>| {
+            ends.push(block.end[0]);
+            Ok(())
+        };
+        let report = check(&mut program, config, &mut planner).unwrap();
+        assert!(report.is_ok(), "{}", report.diagnostics[0]);
+        ends
+    };
+    config.subroutine_path.clear();
+    assert_eq!(ends(&config), [3.0, 8.0]);
+    config.subroutine_path.push(own.path().to_path_buf());
+    assert_eq!(ends(&config), [3.0, 9.0]);
+    std::fs::remove_file(folder.path().join("drill.ngc")).unwrap();
+    let mut program = Program::open(&main).unwrap();
+    let report = check(&mut program, &config, &mut |_, _| Ok(())).unwrap();
+    let told = &report.diagnostics[0].message;
+    assert!(
+        told.contains("no file drill.ngc lies in ") && told.contains(" or beside the program"),
+        "{told}"
+    );
+}
+
 /// A library holds subroutines that nobody calls; what is wrong in one that is called is told at its line.
 #[test]
 fn a_wrong_block_of_a_subroutine_is_told_when_it_is_called() {
