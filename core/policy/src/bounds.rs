@@ -250,6 +250,18 @@ mod tests {
     }
 
     #[test]
+    fn a_tolerance_in_force_that_is_smaller_than_any_that_can_be_asked_for_stays() {
+        let fine = InForce {
+            path_tolerance_mm: 5e-5,
+            ..LINE
+        };
+        for asked in [1e-6, 5e-5, 0.01] {
+            let (tuning, _) = Bounds::default().apply(&[f64::NAN, asked, f64::NAN], &fine);
+            assert!(tuning.is_empty(), "{asked}");
+        }
+    }
+
+    #[test]
     fn ratios_change_no_faster_than_stated() {
         let bounds = Bounds {
             ratio_change_per_s: 2.0,

@@ -1,10 +1,10 @@
 //! Scripts that mean harm: contained every time, and the same every time.
 
-use tandem_policy::{Bounds, Period, Policy, Refusal};
+use tandem_policy::{Bounds, Budget, Facts, Period, Policy, Refusal};
 use tandem_rig::Random;
 use tandem_sdk::Block;
 
-use crate::{as_version_2, chain, decide, each, read, start};
+use crate::{as_version_2, chain, compile, decide, each, read, start, values};
 
 /// Windows and periods in turn; what came out.
 pub fn live(policy: &mut Policy, blocks: &[Block]) -> Vec<u64> {
@@ -147,6 +147,66 @@ fn requests_beyond_the_machine_are_limited_and_counted() {
         notes.contains("line 7: time constant 50 -> 1000 ms, 1.798e308 was asked for"),
         "{notes}"
     );
+}
+
+/// The script that halves feeds, with something else in the place of a piece of its text.
+pub fn half_feed_but(piece: &str, other: &str) -> Vec<u8> {
+    let text = String::from_utf8(read("tests/fixtures/policies/good/half-feed.wat")).unwrap();
+    assert!(text.contains(piece));
+    text.replace(piece, other).into_bytes()
+}
+
+#[test]
+fn of_a_window_with_one_answer_that_is_no_number_none_counts() {
+    let cap = "(f64.mul (f64.const 0.5) (f64.load offset=32 (local.get $at)))";
+    let infinite_at_100 = "(f64.add (f64.const 20) (f64.div (f64.const 1) \
+                           (f64.sub (f64.const 100) (f64.load offset=32 (local.get $at)))))";
+    let mut policy = start(&half_feed_but(cap, infinite_at_100), &[]).unwrap();
+    let mut blocks = chain(&[0.0, 90.0]);
+    decide(&mut policy, &blocks);
+    assert_eq!(policy.tuning(0).feed_cap_mm_per_s, Some(20.02));
+    blocks[1].feed_mm_per_s = 100.0;
+    decide(&mut policy, &blocks);
+    assert_eq!(policy.counters().not_finite, 1);
+    assert!((0..2).all(|index| policy.tuning(index).is_empty()));
+}
+
+#[test]
+fn a_period_without_an_answer_is_driven_at_the_whole_feed_and_the_next_one_begins_there() {
+    let bounds = Bounds {
+        ratio_change_per_s: 1.0,
+        ..Bounds::default()
+    };
+    let mut policy = Policy::new(
+        compile(&half_feed_but(
+            "(f64.const 1) (i32.and",
+            "(f64.const nan) (i32.and",
+        ))
+        .unwrap(),
+        values(&[]),
+        Budget::default(),
+        bounds,
+        &Facts::default(),
+    )
+    .unwrap();
+    let mut ask = |period| {
+        policy.period(&Period {
+            period,
+            duration_s: 0.008,
+            ..Period::default()
+        })
+    };
+    assert_eq!([1, 2, 3].map(&mut ask), [Some(0.992), None, Some(0.992)]);
+    assert_eq!([5, 7].map(&mut ask), [Some(0.984), Some(0.976)]);
+    assert_eq!(policy.counters().ratios, 4);
+    // The whole feed is no ratio that is asked for.
+    let mut policy = start(&read("tests/fixtures/policies/good/half-feed.wat"), &[]).unwrap();
+    let first = Period {
+        duration_s: 0.008,
+        ..Period::default()
+    };
+    assert_eq!(policy.period(&first), Some(1.0));
+    assert_eq!(policy.counters().ratios, 0);
 }
 
 /// A script that asks for the least, as often as it is asked, with these calls.

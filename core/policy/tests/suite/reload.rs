@@ -2,6 +2,7 @@
 
 use tandem_policy::{Budget, Instance, Period, Policy};
 
+use crate::hostile::half_feed_but;
 use crate::{chain, compile, decide, read, start, values};
 
 fn swap(policy: &mut Policy, bytes: &[u8]) -> Result<(), String> {
@@ -34,6 +35,25 @@ fn state_that_is_saved_survives() {
         caps(&mut start(&bytes, &[]).unwrap(), 1),
         caps(&mut reloaded, 1)
     );
+}
+
+#[test]
+fn after_a_script_that_cannot_save_the_next_one_begins_afresh() {
+    let strict = half_feed_but(
+        "(global.set $windows (i64.load (i32.const 0x4000)))",
+        "unreachable",
+    );
+    for saved_bytes in ["0", "9000000", "-1"] {
+        let save = format!("i32.const {saved_bytes})\n  (func (export \"restore\")");
+        let bytes = half_feed_but("i32.const 8)\n  (func (export \"restore\")", &save);
+        let mut policy = start(&bytes, &[]).unwrap();
+        swap(&mut policy, &strict).unwrap();
+        assert_eq!(policy.counters().reloads, 1, "{saved_bytes}");
+        assert_eq!(caps(&mut policy, 1), [Some(25.0)]);
+        // What is saved is handed over, and what fails with it is refused.
+        let why = swap(&mut policy, &strict).unwrap_err();
+        assert!(why.contains("unreachable"), "{why}");
+    }
 }
 
 #[test]
