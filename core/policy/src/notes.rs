@@ -93,4 +93,17 @@ mod tests {
         notes.note(|| "z".to_string());
         assert_eq!(notes.take(), ["y (90 notes were left out before)"]);
     }
+
+    #[test]
+    fn a_quiet_hour_allows_no_flood_and_notes_that_nobody_takes_are_not_kept_for_ever() {
+        let mut notes = Notes::new(0.008);
+        (0..125 * 3600).for_each(|_| notes.period());
+        (0..100).for_each(|_| notes.note(|| "x".to_string()));
+        assert_eq!(notes.take().len(), AT_ONCE as usize);
+        for _ in 0..200 {
+            (0..125).for_each(|_| notes.period());
+            notes.note(|| "y".to_string());
+        }
+        assert_eq!(notes.take().len(), MOST);
+    }
 }

@@ -162,6 +162,7 @@ fn square(vector: &[f64; MAX_AXES]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use tandem_sdk::NurbsData;
 
     fn turn_rad(before: &Direction, after: &Direction) -> f64 {
         let mut turns = vec![];
@@ -193,5 +194,40 @@ mod tests {
                 "{x}"
             );
         }
+    }
+
+    fn axes() -> Axes {
+        Axes::new(&[('X', false), ('A', true), ('Y', false)]).unwrap()
+    }
+
+    #[test]
+    fn only_linear_axes_have_a_direction() {
+        let linear = LinearAxes::of(&axes());
+        let unit = |to: &[f64]| linear.unit(&AxisVector::ZERO, &AxisVector::from_slice(to));
+        assert_eq!(unit(&[0.0, 2.0, 0.0]), None, "the table turns");
+        let both = unit(&[3.0, 100.0, 4.0]).unwrap();
+        assert!((both[0] - 0.6).abs() < 1e-15 && (both[2] - 0.8).abs() < 1e-15);
+        assert_eq!(both[1], 0.0);
+    }
+
+    /// A parabola is bent most in the middle: by its second derivative of 40 over the square of its first one of 20.
+    #[test]
+    fn the_curvature_of_a_curve_is_that_of_its_sharpest_place() {
+        let point = |x: f64, y: f64| AxisVector::from_slice(&[x, 0.0, y]);
+        let data = NurbsData {
+            degree: 2,
+            control_points: vec![point(0.0, 0.0), point(10.0, 10.0), point(20.0, 0.0)],
+            weights: vec![1.0; 3],
+            knots: vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0],
+        };
+        let block = Block {
+            kind: BlockKind::Nurbs,
+            ..Block::at(AxisVector::ZERO)
+        };
+        let linear = LinearAxes::of(&axes());
+        let shape = Shape::of(&block, Some(data.curve()), &axes(), &linear);
+        assert!((shape.curvature_per_mm - 0.1).abs() < 1e-9);
+        let start = shape.start.unwrap();
+        assert!((start[0] - start[2]).abs() < 1e-12 && start[0] > 0.7);
     }
 }

@@ -20,6 +20,7 @@ macro_rules! counters {
 
         impl Counts {
             /// Publishes `counters`. Fine loop; does not allocate.
+            #[inline]
             pub fn store(&self, counters: &Counters) {
                 $(self.$name.store(counters.$name, Relaxed);)*
             }

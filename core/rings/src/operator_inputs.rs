@@ -29,6 +29,7 @@ pub struct OperatorInputs {
 
 impl OperatorInputs {
     /// What `controls` hold now. Any loop; does not allocate.
+    #[inline]
     pub fn of(controls: &Controls) -> Self {
         Self {
             feed_override: controls.feed_override.load(),

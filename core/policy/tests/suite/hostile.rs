@@ -114,6 +114,10 @@ fn each_kind_of_trouble_is_counted_as_what_it_is() {
         (2, 1),
         "not called after the third strike"
     );
+    assert_eq!(
+        (counters.max_window_fuel, counters.max_period_fuel),
+        (22_000, 20_000)
+    );
     assert!(
         notes.contains("line 7: on_blocks: out of fuel: more than 22000 instructions in one call"),
         "{notes}"
@@ -154,6 +158,17 @@ pub fn half_feed_but(piece: &str, other: &str) -> Vec<u8> {
     let text = String::from_utf8(read("tests/fixtures/policies/good/half-feed.wat")).unwrap();
     assert!(text.contains(piece));
     text.replace(piece, other).into_bytes()
+}
+
+#[test]
+fn a_script_that_never_starts_and_one_that_saves_and_cannot_restore_are_refused() {
+    let layout = "(result i32) i32.const 16)";
+    let endless = half_feed_but(layout, "(result i32) (loop $l (br $l)) i32.const 16)");
+    let why = start(&endless, &[]).err().expect("it never starts");
+    assert!(why.to_string().contains("out of fuel"), "{why}");
+    let forgetful = half_feed_but("(func (export \"restore\")", "(func");
+    let why = start(&forgetful, &[]).err().expect("it cannot restore");
+    assert!(why.to_string().contains("go together"), "{why}");
 }
 
 #[test]
