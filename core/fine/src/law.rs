@@ -195,16 +195,19 @@ mod tests {
     /// A stop falls as it rises, so that its way is its time at the mean of both speeds.
     #[test]
     fn the_way_to_a_speed_is_that_of_its_ramps_and_what_is_held_between_them() {
-        for (acceleration, end_mm_per_s, expected_mm) in [
-            (0.0, 0.0, 7.0 * 5.0),
-            (0.0, 4.0, 5.0 * 7.0),
+        let low = 2.1f64;
+        for (speed, acceleration, end_mm_per_s, expected_mm) in [
+            (10.0, 0.0, 0.0, 7.0 * 5.0),
+            (10.0, 0.0, 4.0, 5.0 * 7.0),
             // A second in which it still gets faster, to 10.5 mm/s.
-            (1.0, 0.0, 10.0 + 1.0 / 2.0 - 1.0 / 6.0 + 7.25 * 5.25),
-            // That stop, less its first second.
-            (-1.0, 0.0, 7.25 * 5.25 - (10.5 - 1.0 / 6.0)),
+            (10.0, 1.0, 0.0, 10.0 + 1.0 / 2.0 - 1.0 / 6.0 + 7.25 * 5.25),
+            // Two seconds of that, to 2.1 mm/s, from which the full change is not reached.
+            (0.1, 2.0, 0.0, 0.2 + 4.0 - 8.0 / 6.0 + low.sqrt() * low),
+            // That stop from 10.5 mm/s, less its first second.
+            (10.0, -1.0, 0.0, 7.25 * 5.25 - (10.5 - 1.0 / 6.0)),
         ] {
             let way_mm = Along {
-                speed_mm_per_s: 10.0,
+                speed_mm_per_s: speed,
                 acceleration_mm_per_s2: acceleration,
                 max_mm_per_s2: 2.0,
                 jerk_mm_per_s3: 1.0,
@@ -212,7 +215,7 @@ mod tests {
             .way_to_mm(end_mm_per_s);
             assert!(
                 (way_mm - expected_mm).abs() < 1e-9,
-                "{acceleration} to {end_mm_per_s}: {way_mm} mm"
+                "{speed} {acceleration} to {end_mm_per_s}: {way_mm} mm"
             );
         }
     }

@@ -229,4 +229,63 @@ mod tests {
         );
         assert_eq!(marks(&[(2.0, false), (5.0, false)]), []);
     }
+
+    #[test]
+    fn a_plan_that_gets_faster_behind_its_place_is_met_slower_but_not_below_half() {
+        let slowdown = |acceleration_mm_per_s2: f64| Slowdown {
+            path_mm: 0.0,
+            feed_mm_per_s: 10.0,
+            speed_mm_per_s: 100.0,
+            acceleration_mm_per_s2,
+        };
+        // At a twentieth of the rate a period gains 0.0025 of a thousandth of the acceleration.
+        for (acceleration, expected) in [(-1e6, 5.0), (0.0, 5.0), (4e5, 4.0), (4e6, 2.5)] {
+            let speed = slowdown(acceleration).speed_to_meet_mm_per_s(0.5, 0.001);
+            assert!((speed - expected).abs() < 1e-12, "{acceleration}: {speed}");
+        }
+    }
+
+    #[test]
+    fn more_marks_than_there_is_room_for_are_kept_as_the_worst_of_them() {
+        let mut slowdowns = Slowdowns::new();
+        for number in 0..MARKS + 3 {
+            let high = number == MARKS + 1;
+            slowdowns.mark(Slowdown {
+                path_mm: number as f64,
+                feed_mm_per_s: 1000.0 - number as f64,
+                speed_mm_per_s: 50.0,
+                acceleration_mm_per_s2: if high { 700.0 } else { 5.0 },
+            });
+        }
+        let last = slowdowns.marks().last().unwrap();
+        assert_eq!(slowdowns.marks().count(), MARKS);
+        assert_eq!(
+            (last.feed_mm_per_s, last.acceleration_mm_per_s2),
+            (1000.0 - (MARKS + 2) as f64, 700.0)
+        );
+    }
+
+    #[test]
+    fn a_line_that_ends_at_rest_needs_no_stop_at_its_end() {
+        for (rests, expected) in [(false, Some(5.0)), (true, Some(9.0))] {
+            let (mut input, output) = RingBuffer::new(4);
+            for (line, path_mm, length_mm) in
+                [(1, 0.0, 2.0), (1, 2.0, 3.0), (2, 5.0, 4.0), (3, 9.0, 1.0)]
+            {
+                let mut segment = Segment::rest(&AxisVector::ZERO, 1.0);
+                segment.line = line;
+                segment.flags = if rests && path_mm == 2.0 {
+                    SegmentFlags::ENDS_AT_REST
+                } else {
+                    SegmentFlags::default()
+                };
+                segment.path = [path_mm, length_mm, 0.0, 0.0, 0.0, 0.0];
+                let start_s = 0.0;
+                input.push(Queued::Segment { start_s, segment }).unwrap();
+            }
+            let mut cursor = Cursor::new(output, &AxisVector::ZERO);
+            cursor.advance(0.5, |_| false);
+            assert_eq!(LineEnd::default().look(&mut cursor, 0.0), expected);
+        }
+    }
 }

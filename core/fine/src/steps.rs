@@ -86,3 +86,43 @@ impl Recent {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tandem_sdk::AxisVector;
+
+    /// From 5 mm/s to 7 mm/s, and from an acceleration of nothing to 40 mm/s².
+    fn steps() -> Steps {
+        let segment = |velocity: f64, acceleration: f64| {
+            let mut segment = Segment::rest(&AxisVector::ZERO, 0.5);
+            segment.coefficients[1] = [0.0, velocity, acceleration / 2.0, 0.0, 0.0, 0.0];
+            segment
+        };
+        Steps::between(&segment(5.0, 0.0), &segment(7.0, 40.0))
+    }
+
+    #[test]
+    fn a_step_takes_of_the_limits_what_samples_show_of_it() {
+        let steps = steps();
+        assert!((steps.acceleration_mm_per_s2(1, 0.5, 0.001) - 0.5 * 2.0 / 0.001).abs() < 1e-9);
+        let jerk = 0.5 * (2.0 / 0.001 + 0.75 * 0.5 * 40.0) / 0.001;
+        assert!((steps.jerk_mm_per_s3(1, 0.5, 0.001) - jerk).abs() < 1e-6);
+        assert_eq!(steps.jerk_mm_per_s3(0, 0.5, 0.001), 0.0);
+        let mut twice = steps;
+        twice.join(&steps);
+        assert!((twice.jerk_mm_per_s3(1, 0.5, 0.001) - 2.0 * jerk).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_step_counts_in_the_periods_around_it_and_no_longer() {
+        let mut recent = Recent::default();
+        recent.pass(Some(&steps()));
+        for _ in 1..AROUND {
+            recent.pass(None);
+            assert_eq!(recent.steps(), steps());
+        }
+        recent.pass(None);
+        assert_eq!(recent.steps(), Steps::default());
+    }
+}

@@ -101,3 +101,41 @@ impl StrategyRatio {
         self.led.mean()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rtrb::RingBuffer;
+
+    /// What acts, where these ratios are queued, each for its tick, and take four periods.
+    fn strategy(ratios: &[(u64, f64)]) -> StrategyRatio {
+        let (mut input, output) = RingBuffer::new(8);
+        for (tick, ratio) in ratios {
+            let (tick, ratio) = (*tick, *ratio);
+            input.push(Ratio { tick, ratio }).unwrap();
+        }
+        StrategyRatio::new(output, 4)
+    }
+
+    #[test]
+    fn a_ratio_is_late_where_its_tick_is_over_and_not_in_it() {
+        let mut strategy = strategy(&[(5, 0.5), (6, 0.6), (7, 0.7)]);
+        assert_eq!((strategy.take(4), strategy.now()), (0, 1.0));
+        assert_eq!(strategy.take(5), 0);
+        assert!(strategy.now() < 1.0);
+        assert_eq!(strategy.take(8), 2);
+        assert_eq!(strategy.take(9), 0);
+    }
+
+    #[test]
+    fn a_ratio_is_led_over_evenly_and_its_mean_is_that_of_both_ends_of_a_period() {
+        let mut strategy = strategy(&[(0, 0.6)]);
+        for (tick, now) in [(0, 0.9), (1, 0.8), (2, 0.7), (3, 0.6), (4, 0.6)] {
+            let before = strategy.now();
+            strategy.take(tick);
+            assert!((strategy.now() - now).abs() < 1e-12, "{tick}");
+            let mean = f64::midpoint(before, now);
+            assert!((strategy.mean() - mean).abs() < 1e-12, "{tick}");
+        }
+    }
+}
