@@ -198,3 +198,30 @@ fn the_unit_file_starts_the_command_with_options_that_it_has() {
     }
     assert!(unit.contains("Type=notify") && unit.contains("StateDirectory=tandem"));
 }
+
+/// What the package is made of is there, or is made by the script that packs it; paths are those that cargo-deb takes.
+#[test]
+fn every_file_of_the_package_is_there_or_made_by_its_script() {
+    let manifest = std::fs::read_to_string(root().join("core/cli/Cargo.toml")).unwrap();
+    let script = std::fs::read_to_string(root().join("scripts/package/deb")).unwrap();
+    let (_, assets) = manifest.split_once("\nassets = [\n").unwrap();
+    let sources: Vec<&str> = assets
+        .lines()
+        .map_while(|line| line.trim().strip_prefix("[\"")?.split('"').next())
+        .collect();
+    assert!(sources.len() > 8, "{sources:?}");
+    for source in sources {
+        if source == "target/release/tandem" {
+            continue;
+        }
+        let place = source
+            .strip_prefix("../../")
+            .unwrap_or_else(|| panic!("{source}"));
+        let is_made = place.starts_with("target/") && script.contains(&format!("> {place}\n"));
+        let is_there = root().join(place.trim_end_matches('*')).exists();
+        assert!(
+            is_made || is_there && !place.starts_with("target/"),
+            "{source}"
+        );
+    }
+}
