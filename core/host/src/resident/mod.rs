@@ -403,6 +403,20 @@ impl<'r> Resident<'r> {
         Ok(outcome)
     }
 
+    /// An abort where nothing is driven: the drives hold on, and what an abort switches off goes off. Host.
+    ///
+    /// # Errors
+    /// The computer refuses, or plugins do.
+    pub fn switch_off(&mut self, observer: &mut dyn RunObserver) -> Result<JobOutcome, HostError> {
+        let switches = Switches {
+            unhomed: true,
+            ..Switches::default()
+        };
+        let job = self.source("stopping", Box::new(Nothing), switches)?;
+        self.controls.abort.store(true, Relaxed);
+        self.drive_with(job, false, observer)
+    }
+
     /// Drives a job to its end; the drives are enabled. The machine stands where the outcome says. Host.
     ///
     /// # Errors

@@ -593,8 +593,8 @@ impl Desk {
         self.tell_state();
     }
 
-    /// A job is over. The loop that drives.
-    pub fn finish(&self, mode: Mode, name: &str, outcome: &JobOutcome, unknown_axes: u32) {
+    /// A job is over, whose lines are settled and whose place is shown from here on; [`Desk::close`] follows. The loop that drives.
+    pub fn settle(&self, mode: Mode, outcome: &JobOutcome) {
         let whole = outcome.fault.is_none() && !outcome.aborted;
         // A jog that was let go has switched nothing off.
         let let_go = mode == Mode::Jog && outcome.fault.is_none() && !self.lock().aborting;
@@ -611,10 +611,27 @@ impl Desk {
         self.hub.stands_at(&outcome.position);
         self.path().drive(&outcome.position);
         self.send_scope(true);
+        self.show_left(outcome);
+    }
+
+    /// What is on behind a job. The loop that drives.
+    fn show_left(&self, outcome: &JobOutcome) {
         *self.seen() = Seen {
             switched: outcome.left.switched,
             ..Seen::default()
         };
+    }
+
+    /// An abort that came behind the end of the path has switched off what was on. The loop that drives.
+    pub fn settle_late_abort(&self, outcome: &JobOutcome) {
+        lock(&self.lines).set_switched_off();
+        self.show_left(outcome);
+    }
+
+    /// The job is told, and the next one may begin; `false` where the operator has aborted it meanwhile and it has not been: nothing
+    /// is told yet. The loop that drives.
+    #[must_use]
+    pub fn close(&self, mode: Mode, name: &str, outcome: &JobOutcome, unknown_axes: u32) -> bool {
         let fault = outcome.summary.fault.clone();
         let how = match (&fault, outcome.aborted) {
             (Some(_), _) if self.hub.controls().emergency_stop.load(Relaxed) => {
@@ -625,6 +642,9 @@ impl Desk {
             (None, false) => Outcome::Done,
         };
         let mut inner = self.lock();
+        if how == Outcome::Done && inner.aborting && mode != Mode::Enabling {
+            return false;
+        }
         if let Some(words) = &fault {
             self.fault_in(&mut inner, words);
         }
@@ -654,6 +674,7 @@ impl Desk {
             self.send(None, &described::job_event(&self.machine, &job, outcome));
         }
         self.tell_state();
+        true
     }
 
     /// Asks for jogs from where the machine stands now; whether any waits.

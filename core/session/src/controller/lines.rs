@@ -223,6 +223,15 @@ impl Lines {
         self.ahead = self.standing.clone();
     }
 
+    /// What was on is off; nothing is driven.
+    pub fn set_switched_off(&mut self) {
+        self.turn += 1;
+        self.standing.set_switched_off();
+        if !self.is_at_work() {
+            self.ahead = self.standing.clone();
+        }
+    }
+
     /// Judges a line behind `before`, and drives nothing.
     ///
     /// # Errors

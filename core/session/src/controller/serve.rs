@@ -509,15 +509,18 @@ impl<'r> Controller<'r> {
         let mut watch = Watch::new(
             &self.desk,
             &mut self.script,
-            tell,
+            &mut *tell,
             mode,
             self.clock,
             length_mm,
         );
         watch.recording = recording;
-        let outcome = self.resident.drive(job, &mut watch)?;
+        let mut outcome = self.resident.drive(job, &mut watch)?;
         let recording = watch.recording.take();
-        self.finish(mode, name, &outcome);
+        self.desk.settle(mode, &outcome);
+        while !self.desk.close(mode, name, &outcome, self.unknown_axes()) {
+            self.abort_late(&mut outcome, tell)?;
+        }
         if let Some(recording) = recording {
             recording.finish(&outcome);
         }
@@ -531,9 +534,21 @@ impl<'r> Controller<'r> {
         Some(records.begin((number, mode.name()), self.resident.machine(), signals))
     }
 
-    fn finish(&self, mode: Mode, name: &str, outcome: &JobOutcome) {
-        let unknown = not_homed(self.resident.machine(), self.resident.unknown_axes());
-        self.desk.finish(mode, name, outcome, unknown);
+    /// An abort came when the path had come to its end and nobody had been told: what is on goes off all the same, and the job is
+    /// aborted.
+    fn abort_late(&mut self, outcome: &mut JobOutcome, tell: Tell<'_>) -> Result<(), HostError> {
+        let (desk, script) = (&self.desk, &mut self.script);
+        let mut watch = Watch::new(desk, script, tell, Mode::Idle, self.clock, 0.0);
+        let stopped = self.resident.switch_off(&mut watch)?;
+        (outcome.aborted, outcome.left) = (true, stopped.left);
+        (outcome.fault, outcome.summary.fault) = (stopped.fault, stopped.summary.fault);
+        outcome.summary.stopped = stopped.summary.stopped;
+        self.desk.settle_late_abort(outcome);
+        Ok(())
+    }
+
+    fn unknown_axes(&self) -> u32 {
+        not_homed(self.resident.machine(), self.resident.unknown_axes())
     }
 
     fn enable(&mut self, from: From, resets: bool, emergency_stops: u64, tell: Tell<'_>) {
@@ -559,7 +574,11 @@ impl<'r> Controller<'r> {
                 return;
             }
         };
-        self.finish(Mode::Enabling, "enabling", &outcome);
+        self.desk.settle(Mode::Enabling, &outcome);
+        // An abort that comes when the drives hold finds nothing that moves.
+        let _ = self
+            .desk
+            .close(Mode::Enabling, "enabling", &outcome, self.unknown_axes());
         let answer = match &outcome.summary.fault {
             Some(fault) => Err(fault.clone()),
             None if outcome.aborted => Err("it was aborted".to_string()),

@@ -10,7 +10,7 @@ use tandem_session::controller::NoKeeper;
 
 use crate::doors::{Client, with_controller};
 use crate::scale::from_environment;
-use crate::support::machine;
+use crate::support::{machine, machine_with};
 
 /// An abort that is acknowledged behind a start, however soon: the program is aborted, or was never begun. By itself it would come to
 /// its end only after minutes.
@@ -52,4 +52,48 @@ fn an_abort_behind_a_start_is_never_lost() {
     with_controller(&mill, Box::new(NoKeeper), |_| (), |socket, _| run(socket));
     println!("{stops} stops, TANDEM_SEED={seed}: {aborted} aborted, {unbegun} not begun");
     assert!(aborted > 0);
+}
+
+/// An abort that is acknowledged ends the job, also where the path has come to its end and the loop that looks, which is slow here, has not
+/// seen it yet: the job is aborted, and what was on is off.
+#[test]
+fn an_abort_at_the_end_of_a_job_is_one() {
+    let seed = from_environment("TANDEM_SEED", 1.0) as u64;
+    let mut random = Random::new(seed);
+    let slow = machine_with("mill-3axis.toml", &[("loops.rough_period_ms", "60")]);
+    let mut outcomes = [0, 0];
+    let mut run = |socket: &std::path::Path| {
+        let mut client = Client::in_control(socket);
+        let text = "G21 G90 F3000\nG91 G1 X1\nM2\n";
+        client.ok("load", json!({ "text": text, "name": "short.ngc" }));
+        for nth in 0..8 {
+            let by_hand = nth % 2 == 0;
+            let place = format!("abort {nth}, TANDEM_SEED={seed}");
+            if by_hand {
+                client.say("mdi", json!({ "line": "G91 G1 X-1 F3000 M3 S1000" }));
+            } else {
+                client.ok("start", json!({}));
+            }
+            std::thread::sleep(Duration::from_millis(100 + random.below(300)));
+            let stop = client.say("abort", json!({}));
+            let acknowledged = client.answer(stop).get("ok").is_some();
+            let job = client.wait(|told| told["event"] == "job");
+            let expected = if acknowledged { "aborted" } else { "done" };
+            assert_eq!(job["job"]["outcome"], expected, "{place}: {job}");
+            client.until_state("ready");
+            let status = client.ok("status", json!({}));
+            let is_on = by_hand && !acknowledged;
+            assert_eq!(
+                status["spindle_rpm"].as_f64() != Some(0.0),
+                is_on,
+                "{place}"
+            );
+            let modal = status["modal"].to_string();
+            assert_eq!(modal.contains("M3"), is_on, "{place}: {modal}");
+            outcomes[usize::from(acknowledged)] += 1;
+            client.aside.clear();
+        }
+    };
+    with_controller(&slow, Box::new(NoKeeper), |_| (), |socket, _| run(socket));
+    println!("TANDEM_SEED={seed}: {outcomes:?} came behind the end, and before it");
 }

@@ -456,3 +456,38 @@ fn a_machine_that_is_said_to_rest_stays_where_it_is_shown() {
         }
     }
 }
+
+/// An abort that is acknowledged ends the job, in whichever of its last periods it comes, and nothing is on behind it.
+#[test]
+fn an_abort_in_any_of_the_last_periods_is_one() {
+    let mill = machine("mill-3axis.toml");
+    let part = "G21 G90 M3 S1000\nG1 X10 F3000\nM2\n";
+    let mut random = Random::from_the_clock();
+    let mut before_its_end = 0;
+    for by_hand in [true, false] {
+        for late in (random.below(8)..160).step_by(8) {
+            let mut says = Says::new();
+            if by_hand {
+                says.ask(1000, "mdi", json!({ "line": "M3 S1000" }));
+                says.ask(3000, "mdi", json!({ "line": "G1 X10 F3000" }));
+            } else {
+                says.ask(1000, "load", json!({ "text": part }));
+                says.ask(3000, "start", json!({}));
+            }
+            let abort = says.ask(150 + late, "abort", json!({}));
+            let after = says.ask(2000, "status", json!({}));
+            let told = Told::by(&mill, says, |_| (), Box::new(NoKeeper));
+            let acknowledged = told.answer(abort).get("ok").is_some();
+            let (_, outcome) = told.jobs().pop().unwrap();
+            let (expected, is_on) = match acknowledged {
+                true => ("aborted", false),
+                false => ("done", by_hand),
+            };
+            assert_eq!(outcome, expected, "{late}");
+            let rpm = told.ok(after)["spindle_rpm"].as_f64().unwrap();
+            assert_eq!(rpm > 0.0, is_on, "{late}");
+            before_its_end += usize::from(acknowledged);
+        }
+    }
+    assert!((10..39).contains(&before_its_end), "{before_its_end}");
+}
