@@ -182,7 +182,7 @@ async function withScope(browser, link) {
 // Eight pages, each with eight signals of every period: the controller that serves them misses no more periods than one beside it that
 // serves nobody, and neither it nor they grow.
 export async function tabs() {
-  const loop = `G21 G90 F2000\n${"G1 X20 Y10\nG1 X0 Y0\n".repeat(Math.ceil(TABS_FOR_S * 3) + 200)}M2\n`;
+  const loop = `G21 G90 F2000\n${"G1 X20 Y10\nG1 X0 Y0\n".repeat(Math.ceil(TABS_FOR_S * 3) + 3000)}M2\n`;
   const beside = await serve(MACHINE);
   const alone = await observer(beside.socket);
   try {
