@@ -64,7 +64,7 @@ fn an_abort_at_the_end_of_a_job_is_one() {
     let mut outcomes = [0, 0];
     let mut run = |socket: &std::path::Path| {
         let mut client = Client::in_control(socket);
-        let text = "G21 G90 F3000\nG91 G1 X1\nM2\n";
+        let text = "G21 G91 F3000 M3 S500\nG1 X1\nM2\n";
         client.ok("load", json!({ "text": text, "name": "short.ngc" }));
         for nth in 0..8 {
             let by_hand = nth % 2 == 0;
@@ -73,6 +73,12 @@ fn an_abort_at_the_end_of_a_job_is_one() {
                 client.say("mdi", json!({ "line": "G91 G1 X-1 F3000 M3 S1000" }));
             } else {
                 client.ok("start", json!({}));
+            }
+            // What has not begun would never begin.
+            let is_told =
+                |client: &Client<_>| client.aside.iter().any(|told| told["event"] == "job");
+            while client.ok("status", json!({}))["job"].is_null() && !is_told(&client) {
+                std::thread::yield_now();
             }
             std::thread::sleep(Duration::from_millis(100 + random.below(300)));
             let stop = client.say("abort", json!({}));
