@@ -424,4 +424,24 @@ mod tests {
             cursor.program_time_s() - 9e5
         );
     }
+
+    #[test]
+    fn what_was_queued_before_the_epoch_ended_is_passed_over() {
+        let (mut input, output) = RingBuffer::new(8);
+        let mut push = |block: u64, epoch: u32, start_s: f64| {
+            let mut segment = Segment::rest(&AxisVector::ZERO, 1.0);
+            segment.flags = SegmentFlags::default();
+            (segment.block, segment.epoch) = (block, epoch);
+            input.push(Queued::Segment { start_s, segment }).unwrap();
+        };
+        (0..3).for_each(|block| push(block, 0, block as f64));
+        let mut cursor = Cursor::new(output, &AxisVector::ZERO);
+        assert_eq!(cursor.advance(0.5, |_| false), Reached::Inside);
+        assert_eq!((cursor.segment().block, cursor.epoch()), (0, 0));
+        cursor.end_epoch(&AxisVector::ZERO);
+        push(7, 1, 0.5);
+        assert_eq!(cursor.advance(0.25, |_| false), Reached::Inside);
+        assert_eq!((cursor.segment().block, cursor.epoch()), (7, 1));
+        assert_eq!(cursor.program_time_s(), 0.75);
+    }
 }

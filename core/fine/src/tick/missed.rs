@@ -101,3 +101,26 @@ impl FineLoop {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tandem_sdk::{AxisLimits, Limits};
+
+    /// How many periods of a window may be missed.
+    fn allowed(share: f64, period_s: f64) -> usize {
+        let limits = Limits::new(&[AxisLimits::unlimited(); 3]).unwrap();
+        let mut config = FineConfig::new(period_s, limits);
+        config.missed.share = share;
+        Missed::new(&config).last.len() - 1
+    }
+
+    #[test]
+    fn a_share_in_decimals_loses_no_period_by_its_last_bit() {
+        // As numbers of the computer 0.29 of 100 is a little less than 29.
+        assert!(0.29 * 100.0 < 29.0);
+        assert_eq!(allowed(0.29, 0.01), 29);
+        assert_eq!(allowed(0.295, 0.01), 29);
+        assert_eq!(allowed(0.0, 0.001), 0);
+    }
+}
