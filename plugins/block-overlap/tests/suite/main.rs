@@ -2,6 +2,7 @@
 
 mod axis;
 mod cases;
+mod checks;
 #[path = "../common/mod.rs"]
 mod common;
 mod feed_changes;

@@ -2,5 +2,6 @@
 
 mod axis;
 mod cases;
+mod checks;
 #[path = "../common/mod.rs"]
 mod common;
