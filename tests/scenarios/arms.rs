@@ -10,7 +10,7 @@ const STEP_MM: f64 = 0.1;
 const APART_MM: f64 = 0.02;
 /// By how much a run may be slower than the reference, for which the steps of corners cost nothing: on chains of chords no run that
 /// makes up for them is as fast.
-const SLOWER: f64 = 1.04;
+const SLOWER: f64 = 1.03;
 
 type Place = [f64; 3];
 
