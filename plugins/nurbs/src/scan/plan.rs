@@ -15,10 +15,14 @@ use crate::windowed::{Ramps, Windowed};
 
 /// Share of the jerk limits that is used.
 const JERK_SHARE: f64 = 0.975;
+/// The same of a window that is planned once more: where more than this exceeds the limit between the places, what was found stays.
+const REFINING_JERK_SHARE: f64 = 0.99;
 /// Share of the acceleration limits that is used: between the places asked for it changes a little.
 const ACCELERATION_SHARE: f64 = 0.99;
 /// Tries.
 const TRIES: usize = 8;
+/// Tries of a window that is planned once more.
+const REFINING_TRIES: usize = 3;
 /// Tries after which limits of samples are to be kept, or never will.
 const HOPELESS: usize = 6;
 /// A solution so short, or that takes more than this share of the ramps it began with, is compared with ramps that keep
@@ -46,6 +50,17 @@ pub struct Scan {
     /// For paths on which no rate is found.
     windowed: Windowed,
     window: Window<Ramps>,
+    /// What was found from the first timing.
+    found: Window<Driven>,
+    /// Share of the jerk limits that is used.
+    jerk_share: f64,
+}
+
+/// The motion in pseudo-time along which a rate is sought.
+#[derive(Clone, Copy, PartialEq)]
+enum From {
+    FirstTiming,
+    Found,
 }
 
 impl Planning for Scan {
@@ -72,12 +87,53 @@ impl Scan {
     /// The window at the rate that the limits allow; false where no try keeps them.
     fn plan_rate(&mut self, job: &Job<Driven>, window: &mut Window<Driven>) -> bool {
         self.slowdowns.keep_first(0);
+        self.jerk_share = JERK_SHARE;
+        if !self.keeps(job, window, From::FirstTiming, TRIES) {
+            return false;
+        }
+        if is_gentle(job.bounds) {
+            self.refine(job, window);
+        }
+        true
+    }
+
+    /// Plans the window once more, from the motion that was found: at rates near 1 less of a limit is lost to its linear form. What is
+    /// no faster, or does not keep the limits, is left.
+    fn refine(&mut self, job: &Job<Driven>, window: &mut Window<Driven>) {
+        std::mem::swap(window, &mut self.found);
+        let known = self.slowdowns.count();
+        self.jerk_share = REFINING_JERK_SHARE;
+        let kept = self.keeps(job, window, From::Found, REFINING_TRIES);
+        if !kept || window.duration_s() >= self.found.duration_s() {
+            std::mem::swap(window, &mut self.found);
+        }
+        self.slowdowns.keep_first(known);
+    }
+
+    /// Tries rates until limits are kept, one that begins at a motion and others that take something back; false where none does.
+    fn keeps(
+        &mut self,
+        job: &Job<Driven>,
+        window: &mut Window<Driven>,
+        from: From,
+        tries: usize,
+    ) -> bool {
         // The last try whose samples keep the limits, where single points do not.
         let mut kept = None;
-        for n in 1..=TRIES {
+        for n in 1..=tries {
             let known = self.slowdowns.count();
-            self.solve(job, n > 1, window);
-            if n == 1 {
+            let again = n > 1 && self.grid.ease(&self.slowdowns);
+            if !again {
+                match from {
+                    From::FirstTiming => {
+                        window.whole = self.make_motion(job, &mut window.motion.rated)
+                    }
+                    From::Found if n == 1 => self.follow_found(job, window),
+                    From::Found => return false,
+                }
+            }
+            self.solve(job, again, window);
+            if n == 1 && from == From::FirstTiming {
                 self.begun_s = self.first.end().0;
             }
             if self.crawls(job, window) {
@@ -91,7 +147,7 @@ impl Scan {
                 }
                 continue;
             }
-            if n == TRIES
+            if n == tries
                 || !ease(
                     job.route,
                     job.bounds,
@@ -105,6 +161,14 @@ impl Scan {
         }
         if let Some(known) = kept {
             self.slowdowns.keep_first(known);
+            match from {
+                From::FirstTiming => {
+                    window.whole = self.make_motion(job, &mut window.motion.rated);
+                }
+                From::Found => {
+                    self.grid.ease(&self.slowdowns);
+                }
+            }
             self.solve(job, false, window);
             return !self.dips(job, window)
                 && check(job, window, Look::Segments, &mut self.slowdowns).is_kept();
@@ -166,19 +230,15 @@ impl Scan {
         found
     }
 
-    /// A try, which goes on from the one before where there was one and it was not much faster.
+    /// A rate on the motion there is, from the rate before where that was about the same.
     fn solve(&mut self, job: &Job<Driven>, again: bool, window: &mut Window<Driven>) {
         window.motion.by_ramps = false;
         let motion = &mut window.motion.rated;
-        let again = again && self.grid.ease(&self.slowdowns);
-        if !again {
-            window.whole = self.make_motion(job, motion);
-        }
         let begin = if job.rests() { End::Rest } else { End::Moving };
         let task = Task {
             points: &self.grid.points,
             between: &self.grid.between,
-            limits: limits(job.bounds),
+            limits: limits(job.bounds, self.jerk_share),
             step_s: motion.step_s,
             ends: (begin, End::Rest),
         };
@@ -201,8 +261,7 @@ impl Scan {
     fn make_motion(&mut self, job: &Job<Driven>, motion: &mut Rated) -> bool {
         let whole = self.first.make(job, &self.slowdowns);
         let (total_s, end_mm) = self.first.end();
-        let intervals =
-            ((total_s / grid_s(job.bounds)).ceil() as usize).clamp(MIN_INTERVALS, MAX_INTERVALS);
+        let intervals = intervals(total_s, job.bounds);
         motion.step_s = total_s / intervals as f64;
         let grid = (intervals, motion.step_s);
         fill(
@@ -212,13 +271,44 @@ impl Scan {
             &job.start.state,
             end_mm,
         );
+        self.lay(job, motion, intervals);
+        whole
+    }
+
+    /// The motion that was found, in its own time.
+    fn follow_found(&mut self, job: &Job<Driven>, window: &mut Window<Driven>) {
+        let found = &self.found;
+        let total_s = found.duration_s();
+        let intervals = intervals(total_s, job.bounds);
+        let motion = &mut window.motion.rated;
+        motion.step_s = total_s / intervals as f64;
+        let at = |t_s: f64| {
+            let state = found.at(t_s.clamp(0.0, total_s));
+            [state.s_mm, state.acceleration_mm_per_s2]
+        };
+        fill(
+            &mut motion.coefficients,
+            at,
+            (intervals, motion.step_s),
+            &job.start.state,
+            found.motion.end_mm(),
+        );
+        window.whole = found.whole;
+        self.lay(job, motion, intervals);
+    }
+
+    fn lay(&mut self, job: &Job<Driven>, motion: &Rated, intervals: usize) {
         self.grid
             .lay(job.route, job.bounds, motion, intervals, &self.slowdowns);
         if !job.rests() {
             self.grid.yield_at_start();
         }
-        whole
     }
+}
+
+/// Intervals of the grid for a motion of `total_s`.
+fn intervals(total_s: f64, bounds: &Bounds) -> usize {
+    ((total_s / grid_s(bounds)).ceil() as usize).clamp(MIN_INTERVALS, MAX_INTERVALS)
 }
 
 /// A time that is long for the way of a window from rest, s: several times that of a line. The first timing says nothing of hairpins
@@ -234,16 +324,29 @@ fn long_s(job: &Job<Driven>, window: &Window<Driven>) -> f64 {
 
 /// Grid of pseudo-time, s: a quarter of the time in which an acceleration is built up.
 fn grid_s(bounds: &Bounds) -> f64 {
+    wanted_grid_s(bounds).clamp(bounds.context.fine_period_s, max_grid_s(bounds))
+}
+
+/// Whether accelerations are built up so slowly that the grid is finer than it had to be: then the jerk bounds most of a window, the
+/// rate along the first timing is far from 1, and a window that is planned once more is 1 % faster. Elsewhere it is not, and planning
+/// has no time for it.
+fn is_gentle(bounds: &Bounds) -> bool {
+    wanted_grid_s(bounds) > max_grid_s(bounds)
+}
+
+fn wanted_grid_s(bounds: &Bounds) -> f64 {
     let axes = bounds.context.limits.axes().iter();
-    let build_up_s = axes
-        .map(|a| a.acceleration_mm_per_s2 / a.jerk_mm_per_s3)
-        .fold(f64::INFINITY, f64::min);
-    let period_s = bounds.context.fine_period_s;
-    (build_up_s / 4.0).clamp(period_s, (3.0 * period_s).max(MAX_GRID_S))
+    axes.map(|a| a.acceleration_mm_per_s2 / a.jerk_mm_per_s3)
+        .fold(f64::INFINITY, f64::min)
+        / 4.0
+}
+
+fn max_grid_s(bounds: &Bounds) -> f64 {
+    (3.0 * bounds.context.fine_period_s).max(MAX_GRID_S)
 }
 
 /// The limits as far as the grid uses them.
-fn limits(bounds: &Bounds) -> AxisLimits {
+fn limits(bounds: &Bounds, jerk_share: f64) -> AxisLimits {
     let axes = bounds.context.limits.axes();
     let all = |of: &dyn Fn(&tandem_sdk::AxisLimits) -> f64| -> [f64; MAX_AXES] {
         std::array::from_fn(|i| axes.get(i).map_or(f64::INFINITY, of))
@@ -251,6 +354,6 @@ fn limits(bounds: &Bounds) -> AxisLimits {
     AxisLimits {
         count: axes.len(),
         acceleration_mm_per_s2: all(&|a| ACCELERATION_SHARE * a.acceleration_mm_per_s2),
-        jerk_mm_per_s3: all(&|a| JERK_SHARE * a.jerk_mm_per_s3),
+        jerk_mm_per_s3: all(&|a| jerk_share * a.jerk_mm_per_s3),
     }
 }
