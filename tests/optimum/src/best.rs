@@ -58,8 +58,13 @@ struct Ease {
     acceleration: f64,
 }
 
-/// The shortest time along `course` from rest to rest, on a last grid of `step_s`.
+/// The shortest time along `course` from rest to rest, on a last grid of `step_s`; no number where no rate is found for some place.
 pub fn best(course: &Course, limits: &Limits, step_s: f64) -> Best {
+    let none = Best {
+        relaxed_s: f64::NAN,
+        kept_s: f64::NAN,
+        relaxed_share: f64::NAN,
+    };
     let mut motion = slow(course, limits);
     let mut eases = Vec::new();
     let mut retimer = AnyRetimer::default();
@@ -72,6 +77,9 @@ pub fn best(course: &Course, limits: &Limits, step_s: f64) -> Best {
             &eases,
             &mut retimer,
         );
+        if !motion.duration_s().is_finite() {
+            return none;
+        }
     }
     let relaxed_s = motion.duration_s();
     let relaxed_share = ease(course, limits, &motion, &mut Vec::new());
@@ -82,6 +90,9 @@ pub fn best(course: &Course, limits: &Limits, step_s: f64) -> Best {
             break;
         }
         motion = turn(course, limits, &motion, step_s, &eases, &mut retimer);
+        if !motion.duration_s().is_finite() {
+            break;
+        }
     }
     Best {
         relaxed_s,
