@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use tandem_sdk::{Axes, AxisVector, MAX_AXES};
 
-use crate::lasting::Lasting;
+use crate::lasting::{Lasting, SwitchedOn};
 use crate::stated::Watched;
 
 /// One row of the tool table.
@@ -122,6 +122,8 @@ pub struct Config {
     /// What has lasted from the programs before; its tool table is to be that of `tools`. None where a program begins with
     /// nothing but this machine.
     pub lasting: Option<Arc<Lasting>>,
+    /// Spindle and coolant as they are when the program begins.
+    pub on: SwitchedOn,
 }
 
 /// The first of the numbers of commands of the machine's own: M100.
@@ -157,6 +159,7 @@ impl Config {
             max_steps: DEFAULT_MAX_STEPS,
             watched: Vec::new(),
             lasting: None,
+            on: SwitchedOn::default(),
         }
     }
 }

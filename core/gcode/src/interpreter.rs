@@ -9,6 +9,7 @@ use crate::config::Config;
 use crate::diagnostic::{Diagnostic, Severity};
 use crate::flow::{by_hand, o_word};
 use crate::item::{Item, ProbeResult};
+use crate::lasting::SwitchedOn;
 use crate::line::Line;
 use crate::line_error::{Checked, LineError, Span};
 use crate::state::State;
@@ -79,7 +80,9 @@ impl Interpreter {
     /// An interpreter at the start of a program on the machine `config`.
     pub fn new(config: Config) -> Self {
         let lasting = config.lasting.clone();
+        let on = config.on;
         let mut new = Self::without_lasting(config);
+        (new.state.spindle, new.state.coolant) = (on.spindle, on.coolant);
         if let Some(lasting) = lasting {
             new.set_lasting(&lasting);
         }
@@ -101,6 +104,14 @@ impl Interpreter {
             reported_line: None,
             unknown: None,
             config,
+        }
+    }
+
+    /// Spindle and coolant behind what was read, for a program that begins with them.
+    pub fn switched_on(&self) -> SwitchedOn {
+        SwitchedOn {
+            spindle: self.state.spindle,
+            coolant: self.state.coolant,
         }
     }
 

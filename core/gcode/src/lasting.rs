@@ -10,6 +10,8 @@ use crate::interpreter::Interpreter;
 use crate::state::State;
 use crate::state::coordinates::SYSTEMS;
 use crate::state::parameters::Written;
+use crate::words::coolant::Coolant;
+use crate::words::spindle::Spindle;
 
 /// Number of work coordinate systems: G54 to G59, G59.1 to G59.3.
 pub const WORK_SYSTEMS: usize = SYSTEMS;
@@ -292,6 +294,13 @@ pub fn system_code(index: usize) -> String {
     } else {
         format!("G59.{}", index - 5)
     }
+}
+
+/// Spindle and coolant as lines have left them.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SwitchedOn {
+    pub(crate) spindle: Spindle,
+    pub(crate) coolant: Coolant,
 }
 
 #[cfg(test)]

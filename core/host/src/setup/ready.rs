@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use tandem_faults::{Faults, Joints};
-use tandem_gcode::{CheckReport, Config, Lasting, Ledger, Program, Stream, Watched, check};
+use tandem_gcode::{
+    CheckReport, Config, Lasting, Ledger, Program, Stream, SwitchedOn, Watched, check,
+};
 use tandem_machine::Machine;
 use tandem_rough::Source;
 use tandem_sdk::{Block, Curve, Kinematics, Planner};
@@ -55,6 +57,8 @@ pub struct Memory {
     pub lasting: Arc<Lasting>,
     /// What its lines change, until the path reaches them.
     pub ledger: Ledger,
+    /// Spindle and coolant as they are then.
+    pub on: SwitchedOn,
 }
 
 impl Memory {
@@ -63,6 +67,7 @@ impl Memory {
         let mut config = parts::interpreter_config(machine, simulated, switches);
         config.tools.clone_from(&self.lasting.tools);
         config.lasting = Some(Arc::clone(&self.lasting));
+        config.on = self.on;
         config
     }
 }

@@ -372,6 +372,7 @@ impl<'r> Controller<'r> {
         Memory {
             lasting: Arc::new(lines.standing().lasting()),
             ledger: lines.ledger.clone(),
+            on: lines.standing().switched_on(),
         }
     }
 

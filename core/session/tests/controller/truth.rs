@@ -491,3 +491,51 @@ fn an_abort_in_any_of_the_last_periods_is_one() {
     }
     assert!((10..39).contains(&before_its_end), "{before_its_end}");
 }
+
+/// The end of a program switches spindle and coolant off, also where lines by hand had turned them on and it does not know of them.
+#[test]
+fn behind_the_end_of_a_program_nothing_turns() {
+    let mut says = Says::new();
+    says.ask(1000, "mdi", json!({ "line": "M3 S1000 M8" }));
+    says.ask(
+        2000,
+        "load",
+        json!({ "text": "G21 G90 F3000\nG1 X1\nM2\n" }),
+    );
+    let before = says.ask(100, "status", json!({}));
+    says.ask(10, "start", json!({}));
+    let after = says.ask(2000, "status", json!({}));
+    says.ask(10, "mdi", json!({ "line": "M3 S1000" }));
+    let part = "G21 G90 F3000\nG1 X5\nM5\nG1 X90\nM2\n";
+    says.ask(2000, "load", json!({ "text": part }));
+    says.ask(10, "start", json!({}));
+    let stopped = says.ask(1000, "status", json!({}));
+    says.ask(9000, "mdi", json!({ "line": "M3 S1000" }));
+    let again = says.ask(2000, "status", json!({}));
+    let told = Told::by(
+        &machine("mill-3axis.toml"),
+        says,
+        |_| (),
+        Box::new(NoKeeper),
+    );
+    let seen = |id| {
+        let status = told.ok(id);
+        let rpm = status["spindle_rpm"].as_f64().unwrap().round();
+        let modal = status["modal"].to_string();
+        (rpm, status["coolant"].clone(), modal.contains("M3"))
+    };
+    assert_eq!(seen(before), (1000.0, json!("flood"), true));
+    assert_eq!(seen(after), (0.0, json!("off"), false));
+    assert_eq!(seen(stopped).0, 0.0, "M5 of the program");
+    assert_eq!(told.ok(stopped)["state"], "running");
+    assert_eq!(seen(again).0, 1000.0);
+    let outcomes: Vec<_> = told
+        .jobs()
+        .into_iter()
+        .map(|(_, outcome)| outcome)
+        .collect();
+    assert!(
+        outcomes.iter().all(|outcome| outcome == "done"),
+        "{outcomes:?}"
+    );
+}
