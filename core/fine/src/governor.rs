@@ -79,7 +79,8 @@
 //! place, two before it and two behind, the governor leaves that out of what it uses.
 //!
 //! Asked for is a path speed, ratio × programmed feed, not a scale: a corner that is slower than that anyway runs as
-//! planned.
+//! planned. Behind it the plan, which is made at `max_feed_ratio`, may be too fast; so with a jerk limit σ is taken only to
+//! where it can be lowered from in time (`governor/way_below.rs`).
 //!
 //! # Places ahead
 //!
@@ -99,9 +100,9 @@ mod order2;
 mod order3;
 mod rest_at;
 pub mod tuning;
+mod way_below;
 
 use feeds_ahead::FeedsAhead;
-use keep_feed::FeedPoint;
 use keep_limits::Recovery;
 pub use order3::Aim;
 pub use rest_at::RestAt;
@@ -127,8 +128,8 @@ pub struct Governor {
     /// Where jerk is limited: the recovery that was found last, and one that is being tried.
     recovery: Recovery,
     tried: Recovery,
-    /// Room for the places ahead at which a feed is to be kept.
-    feed_points: Box<[FeedPoint]>,
+    /// Steps on ways below a feed that may still be tried in this period.
+    steps_left: u32,
 }
 
 impl Governor {
@@ -143,7 +144,7 @@ impl Governor {
             feeds_ahead: FeedsAhead::new(PeriodPoints::new(limits, axes)),
             recovery: Recovery::new(),
             tried: Recovery::new(),
-            feed_points: FeedPoint::room(),
+            steps_left: 0,
         }
     }
 

@@ -339,23 +339,6 @@ impl<'a> PlanCursor<'a> {
         motion
     }
 
-    /// Writes to `motion` how the plan moves here, and gives how fast on its path, as [`PlanCursor::pace`] has it; `None` where nothing
-    /// moves.
-    pub fn look_at_motion(&self, motion: &mut Motion) -> Option<f64> {
-        let segment = self.segment?;
-        let [speed, ..] = derivatives(&segment.path, self.local_s);
-        motion.look_at(segment, self.local_s, self.plan.axes);
-        let mut squares = 0.0;
-        for axis in (0..self.plan.axes).filter(|axis| self.plan.linear >> axis & 1 == 1) {
-            squares += motion.velocity[axis] * motion.velocity[axis];
-        }
-        Some(if squares > speed * speed {
-            f64::sqrt(squares)
-        } else {
-            speed
-        })
-    }
-
     /// Where the plan is on its path here, per s of program time; `None` where nothing moves.
     ///
     /// The path coordinate of a planner is a polynomial of its own, which may fall short of the way that the axes drive: the
@@ -448,6 +431,29 @@ impl<'a> PlanCursor<'a> {
                 Some(Steps::between(before, behind))
             }
             _ => None,
+        }
+    }
+
+    /// Goes from a rest to the start of what moves next; whether the place was at a rest, and something moves behind it.
+    pub fn begin_behind_rest(&mut self) -> bool {
+        let is_at_rest = self
+            .segment
+            .is_some_and(|it| ends(it) && self.local_s >= it.duration_s);
+        if !is_at_rest {
+            return false;
+        }
+        let mut behind = *self;
+        loop {
+            match behind.plan.entry(behind.passed) {
+                Some(Queued::Segment { segment, .. }) if segment.duration_s > 0.0 => {
+                    behind.passed += 1;
+                    (behind.segment, behind.local_s) = (Some(segment), 0.0);
+                    *self = behind;
+                    return true;
+                }
+                Some(_) => behind.passed += 1,
+                None => return false,
+            }
         }
     }
 

@@ -7,7 +7,10 @@
 
 use super::Governor;
 use super::interval::{Interval, RateAt};
-use super::tuning::{ACCELERATION_SHARE, JERK_SHARE, RECOVERY_PERIODS, RECOVERY_RAMPS};
+use super::tuning::{
+    ACCELERATION_SHARE, FEED_WAY_LIMIT_SHARE, FEED_WAY_PERIODS, JERK_SHARE, RECOVERY_PERIODS,
+    RECOVERY_RAMPS,
+};
 use crate::horizon::Horizon;
 use crate::plan_ahead::{Motion, PlanCursor};
 use crate::steps::{AROUND, Recent, Steps};
@@ -23,26 +26,38 @@ pub(super) struct Recovery {
     changes_per_s2: Box<[f64]>,
     count: usize,
     passed: usize,
+    /// It keeps a feed to its end, and may begin where σ is constant.
+    pub keeps_feed: bool,
 }
 
 impl Recovery {
     /// A way without periods, with room for the longest.
     pub(super) fn new() -> Self {
         Self {
-            changes_per_s2: vec![0.0; RECOVERY_PERIODS[1] as usize].into_boxed_slice(),
+            changes_per_s2: vec![0.0; RECOVERY_PERIODS[1].max(FEED_WAY_PERIODS[1]) as usize]
+                .into_boxed_slice(),
             count: 0,
             passed: 0,
+            keeps_feed: false,
         }
     }
 
     /// Forgets the way: σ is constant.
     pub(super) fn clear(&mut self) {
-        (self.count, self.passed) = (0, 0);
+        (self.count, self.passed, self.keeps_feed) = (0, 0, false);
     }
 
-    fn push(&mut self, change_per_s2: f64) {
-        self.changes_per_s2[self.count] = change_per_s2;
-        self.count += 1;
+    /// Goes on with this σ̈. What is beyond the room for it is not noted.
+    pub(super) fn push(&mut self, change_per_s2: f64) {
+        if let Some(next) = self.changes_per_s2.get_mut(self.count) {
+            *next = change_per_s2;
+            self.count += 1;
+        }
+    }
+
+    /// σ̈ of its next period.
+    pub(super) fn peek(&self) -> Option<f64> {
+        self.changes_per_s2[..self.count].get(self.passed).copied()
     }
 
     /// The next period of the way, and whether it is the last.
@@ -93,7 +108,7 @@ impl Governor {
         horizon: &Horizon,
     ) -> Option<f64> {
         let h = self.period_s;
-        let range = self.range(&here, horizon)?;
+        let range = self.range(&here, self.period_s, horizon)?;
         let mut tries = |change: f64| {
             let mut way = here;
             way.pass(change, h);
@@ -134,7 +149,10 @@ impl Governor {
                 return true;
             }
             // What is not queued yet could be anything.
-            let Some(range) = self.range(&way, horizon).filter(|_| way.place.is_known()) else {
+            let Some(range) = self
+                .range(&way, self.period_s, horizon)
+                .filter(|_| way.place.is_known())
+            else {
                 return false;
             };
             let steady = -way.rate_per_s / h;
@@ -148,14 +166,13 @@ impl Governor {
         false
     }
 
-    /// σ̈ that the limits allow in the period that begins here.
-    fn range(&self, way: &RateState<'_>, horizon: &Horizon) -> Option<Interval> {
-        let h = self.period_s;
+    /// σ̈ that the limits allow in the `h` seconds that begin here: a period, or some of them.
+    pub(super) fn range(&self, way: &RateState<'_>, h: f64, horizon: &Horizon) -> Option<Interval> {
         let mut interval = Interval::ALL;
         let whole_s = h * (way.sigma + h * way.rate_per_s / 2.0).clamp(0.0, 1.0);
         let (mut place, mut left_s) = (way.place, whole_s);
         let bounds = (horizon, &self.reserve(way));
-        self.keep_at(way, 0.0, &place.motion(), bounds, &mut interval);
+        self.keep_at(way, (0.0, h), &place.motion(), bounds, &mut interval);
         while left_s > NONE_S {
             // With the middle, what samples show of a quadratic course is a mean of what is kept here (Simpson's rule).
             let stretch_s = place.stretch_s(left_s);
@@ -163,7 +180,7 @@ impl Governor {
                 place.advance(stretch_s / 2.0);
                 self.keep_at(
                     way,
-                    1.0 - end_s / whole_s,
+                    (1.0 - end_s / whole_s, h),
                     &place.motion(),
                     bounds,
                     &mut interval,
@@ -174,7 +191,7 @@ impl Governor {
                 place.step();
                 self.keep_at(
                     way,
-                    1.0 - left_s / whole_s,
+                    (1.0 - left_s / whole_s, h),
                     &place.motion(),
                     bounds,
                     &mut interval,
@@ -183,7 +200,7 @@ impl Governor {
         }
         if whole_s <= NONE_S {
             // From rest next to no program time passes in the period, but σ̇ grows in it, and the velocity of the axes.
-            self.keep_at(way, 1.0, &place.motion(), bounds, &mut interval);
+            self.keep_at(way, (1.0, h), &place.motion(), bounds, &mut interval);
         }
         (!interval.is_empty()).then_some(interval)
     }
@@ -197,29 +214,35 @@ impl Governor {
         steps
     }
 
-    /// Jerk and acceleration at a point of the period, the share `part` of its program time from its start.
+    /// Jerk and acceleration at a point of the time that is looked at, the share `part` of its program time from its start.
     fn keep_at(
         &self,
         way: &RateState<'_>,
-        part: f64,
+        (part, time_s): (f64, f64),
         motion: &Motion,
         (horizon, reserve): (&Horizon, &Steps),
         keep: &mut Interval,
     ) {
         let h = self.period_s;
         let at = RateAt {
-            sigma: (way.sigma + part * h * way.rate_per_s).clamp(0.0, 1.0),
+            sigma: (way.sigma + part * time_s * way.rate_per_s).clamp(0.0, 1.0),
             rate_per_s: way.rate_per_s,
             part,
-            period_s: h,
+            period_s: time_s,
+        };
+        // Between the points of some periods more may be used than at them.
+        let share = if time_s > h {
+            FEED_WAY_LIMIT_SHARE
+        } else {
+            1.0
         };
         for (axis, (acceleration_limit, jerk_limit)) in horizon.limits() {
             let velocity = motion.velocity[axis];
             let acceleration = motion.acceleration[axis];
-            let left = JERK_SHARE * jerk_limit - reserve.jerk_mm_per_s3(axis, at.sigma, h);
+            let left = share * JERK_SHARE * jerk_limit - reserve.jerk_mm_per_s3(axis, at.sigma, h);
             let planned = [velocity, acceleration, motion.jerk[axis]];
             keep.keep_jerk(planned, &at, (left, jerk_limit), 0.0);
-            let left = ACCELERATION_SHARE * acceleration_limit
+            let left = share * ACCELERATION_SHARE * acceleration_limit
                 - reserve.acceleration_mm_per_s2(axis, at.sigma, h);
             keep.keep_acceleration([velocity, acceleration], &at, left);
         }

@@ -10,6 +10,7 @@ use super::rest_at::RestAt;
 use super::tuning::{
     APPROACH_END_FACTOR, CLEARLY_LONGER, EXCESSES, ORDER3_LIMIT_SHARE, SNAP_SHARE,
 };
+use super::way_below::Below;
 use crate::horizon::Horizon;
 use crate::law::{stop_s, to_rest};
 use crate::plan_ahead::PlanCursor;
@@ -24,6 +25,8 @@ pub struct Aim {
     pub speed_mm_per_s: f64,
     /// Share of the programmed feeds ahead that is not to be exceeded there; infinite where the plan keeps what is asked.
     pub ratio: f64,
+    /// Rate at which the plan keeps that share wherever it is.
+    pub kept_rate: f64,
     /// Derivatives of the plan's path coordinate here by program time.
     pub path: [f64; 3],
     /// Where to rest.
@@ -55,7 +58,9 @@ impl Governor {
             place,
             recent,
         };
-        let wanted = if aim.speed_mm_per_s > 0.0 && aim.speed_mm_per_s.min(aim.ratio).is_finite() {
+        let mut below = (aim.speed_mm_per_s > 0.0 && aim.speed_mm_per_s.min(aim.ratio).is_finite())
+            .then(|| Below::new(aim, &here, self.period_s));
+        let wanted = if below.is_some() {
             self.wanted_below(aim, horizon, &here)
         } else {
             self.wanted_freely(aim, horizon, &place)
@@ -71,33 +76,76 @@ impl Governor {
             }
             None => wanted,
         };
-        if wanted == 0.0 && self.rate_per_s == 0.0 {
+        let chosen = self.choose_change(wanted, here, below.as_mut(), horizon);
+        self.end_approach(aim, horizon);
+        chosen
+    }
+
+    /// The σ̈ nearest to `wanted` that leaves a way on, taken.
+    fn choose_change(
+        &mut self,
+        wanted: f64,
+        mut here: RateState<'_>,
+        below: Option<&mut Below<'_>>,
+        horizon: &Horizon,
+    ) -> Chosen {
+        let is_constant = wanted == 0.0 && self.rate_per_s == 0.0;
+        let below = below.filter(|below| !is_constant || self.sigma > below.kept_rate);
+        if is_constant && below.is_none() {
+            self.recovery.clear();
             return Chosen {
                 delta_s: self.sigma * self.period_s,
                 relaxed: false,
             };
         }
-        let chosen = match self.recoverable(wanted, here, horizon) {
+        let mut change = None;
+        if let Some(below) = below {
+            if is_constant && here.place.begin_behind_rest() {
+                self.begin_kept(here, below, horizon);
+                return Chosen {
+                    delta_s: self.sigma * self.period_s,
+                    relaxed: false,
+                };
+            }
+            change = self.recoverable_below(wanted, here, below, horizon);
+        } else {
+            self.recovery.keeps_feed = false;
+        }
+        if change.is_none() && !self.recovery.keeps_feed {
+            change = self.recoverable(wanted, here, horizon);
+        } else if change.is_none() && !self.keeps_limits_on(&here, horizon) {
+            // The limits come before the feed.
+            self.recovery.keeps_feed = false;
+            let wanted = self.recovery.peek().unwrap_or(wanted);
+            change = self.recoverable(wanted, here, horizon);
+        }
+        match change {
             Some(change) => Chosen {
                 delta_s: self.pass(change),
                 relaxed: false,
             },
             None => self.go_on(horizon, &self.reserve(&here)),
-        };
-        self.end_approach(aim, horizon);
-        chosen
+        }
     }
 
     /// Follows the way that was found last, at whose end σ is constant.
     fn go_on(&mut self, horizon: &Horizon, reserve: &Steps) -> Chosen {
-        if self.rate_per_s == 0.0 {
+        if self.rate_per_s == 0.0 && !self.recovery.keeps_feed {
             return Chosen {
                 delta_s: self.pass(0.0),
                 relaxed: false,
             };
         }
         let Some((change, last)) = self.recovery.next() else {
-            return self.relaxed(horizon, reserve);
+            self.recovery.keeps_feed = false;
+            return if self.rate_per_s == 0.0 {
+                Chosen {
+                    delta_s: self.pass(0.0),
+                    relaxed: false,
+                }
+            } else {
+                self.relaxed(horizon, reserve)
+            };
         };
         let delta_s = self.pass(change);
         if last {

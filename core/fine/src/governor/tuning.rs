@@ -39,6 +39,22 @@ pub const RECOVERY_RAMPS: f64 = 3.2;
 /// acceleration within a few periods, a change of the rate in small steps still needs some; and the work of a period is bounded.
 pub const RECOVERY_PERIODS: [f64; 2] = [16.0, 640.0];
 
+/// Order 3: for how long a way on which a feed is kept is tried out, in units of the longest time in which an axis changes its
+/// acceleration from none to its limit; and the least and most fine periods of it.
+pub const FEED_WAY_RAMPS: f64 = 6.0;
+pub const FEED_WAY_PERIODS: [f64; 2] = [64.0, 2560.0];
+
+/// Order 3: fine periods of a way that are tried one by one. A step behind them lasts for as many periods as this many go into
+/// what has passed of the way.
+pub const FEED_WAY_SINGLE_PERIODS: u32 = 48;
+
+/// Order 3: share of the limits of jerk and acceleration that such longer steps count on: they are looked at nowhere between
+/// their points.
+pub const FEED_WAY_LIMIT_SHARE: f64 = 0.95;
+
+/// Order 3: steps on such ways that are tried in a fine period, all together: the work of a period is bounded.
+pub const FEED_WAY_STEPS: u32 = 500;
+
 /// Order 3: share of the jerk that an approach counts on where the plan turns or changes its speed ahead.
 pub const APPROACH_JERK_SHARE: f64 = 0.8;
 
@@ -89,22 +105,14 @@ pub const MAX_LOWERING: f64 = 0.3;
 /// Order 3: share of the feed that is aimed at: the mean over a period may be that much higher than its ends.
 pub const FEED_SHARE: f64 = 1.0 - 1e-6;
 
-/// Order 3: how many times as far each point of the trial of rates ahead lies from the one before as that one from its own.
-/// The first lies a period away, for a plan of small features turns within a few; together they reach over 1900 periods,
-/// longer than most machines take to their feed.
+/// Order 3: how many times as far each place ahead at which a constant rate is looked at lies from the one before as that one
+/// from its own. The first lies a period away, for a plan of small features turns within a few; together they reach over 1900
+/// periods, longer than most machines take to their feed.
 pub const FEED_POINT_SPACING: f64 = 1.12;
 
-/// Order 3: least rate for whose periods the first of those distances is taken: nearer to a rest the points would not reach far
+/// Order 3: least rate for whose periods the first of those distances is taken: nearer to a rest the places would not reach far
 /// enough.
 pub const FEED_POINT_MIN_RATE: f64 = 0.02;
-
-/// Order 3: share of the limits of jerk and acceleration that the trial counts on: between the points more may be used. Of 17
-/// cases in which a feed was exceeded 0.9 leaves four, 0.8 one, by 0.001 %; of seven with sharp curves 0.8 leaves two, 0.75 one.
-pub const FEED_POINT_LIMIT_SHARE: f64 = 0.75;
-
-/// Order 3: share of the rate that all points ahead allow below which the trial does not lower it. With 1 a feed was exceeded
-/// that 0.5 keeps.
-pub const TRIAL_RATE_SHARE: f64 = 0.5;
 
 /// Order 3: fine periods from rest for which the first rate is to last: what the plan gains in fewer than these the rate could
 /// not follow.

@@ -1,0 +1,428 @@
+//! A way on which the feed is kept to its end. A change of the rate of program time is begun only where there is one: no later
+//! sample is then beyond the feed, whatever the plan does in between.
+//!
+//! From the end of the period on σ either becomes constant, at a rate at which no place ahead is too fast, or it is lowered
+//! as far as the limits allow, until it is constant at the rate at which the plan keeps the feed everywhere. Either is tried
+//! out on the queued plan period by period, with the same bounds as the period that is driven. So it does not matter that an
+//! axis which turns leaves nothing to lower σ with just before the plan is too fast: a rate from which it would have to be
+//! lowered there is never reached. The way that was found is kept, and is gone where the next period finds no better one.
+
+use super::Governor;
+use super::interval::Interval;
+use super::keep_limits::RateState;
+use super::order3::Aim;
+use super::tuning::{
+    FEED_POINT_MIN_RATE, FEED_POINT_SPACING, FEED_WAY_PERIODS, FEED_WAY_RAMPS,
+    FEED_WAY_SINGLE_PERIODS, FEED_WAY_STEPS, MAX_LOWERING,
+};
+use crate::horizon::Horizon;
+use crate::plan_ahead::{Pace, PlanCursor};
+
+/// Tries between the σ̈ wanted and the one that lowers σ as far as the limits allow.
+const HALVINGS: u32 = 3;
+/// Places ahead at which a constant rate is looked at.
+const PLACES: usize = 48;
+/// Rates with which it may begin from rest.
+const BEGINNINGS: u32 = 5;
+/// How often the feed is looked at in a step of a way that lasts for as many periods or more.
+const LOOKS: u32 = 4;
+/// Share of the rate at which the plan keeps the feed everywhere that a way is aimed at: it ends between the two.
+const LANDING_SHARE: f64 = 0.9;
+/// Share of what the limits leave of σ̈ by which a way that was tried out differs from it by rounding.
+const ROUNDED_SHARE: f64 = 1e-3;
+/// Relative tolerance on the feed.
+const TOLERANCE: f64 = 1e-7;
+
+/// Which speed is to be kept ahead.
+#[derive(Debug)]
+pub(super) struct Below<'a> {
+    /// Share of the programmed feeds.
+    ratio: f64,
+    /// Rate at which the plan keeps that share wherever it is.
+    pub kept_rate: f64,
+    /// The highest rates at places ahead, nearest first. Each is looked at when it is first asked for.
+    most: [f64; PLACES],
+    seen: usize,
+    place: PlanCursor<'a>,
+    /// Program time from the last one seen to the next, s.
+    step_s: f64,
+}
+
+impl<'a> Below<'a> {
+    /// What is asked for, from `here` on.
+    pub(super) fn new(aim: &Aim, here: &RateState<'a>, period_s: f64) -> Self {
+        let mut place = here.place;
+        place.go(period_s * here.sigma);
+        Self {
+            ratio: aim.ratio,
+            kept_rate: aim.kept_rate,
+            most: [0.0; PLACES],
+            seen: 0,
+            place,
+            step_s: period_s * here.sigma.max(FEED_POINT_MIN_RATE),
+        }
+    }
+
+    /// The highest rate at the place of this number; `None` after the last, and where nothing moves there.
+    fn rate_at(&mut self, number: usize) -> Option<f64> {
+        if number == self.seen
+            && let Some(next) = self.most.get_mut(number)
+        {
+            self.place.go(self.step_s);
+            let pace = self.place.pace()?;
+            *next = self.ratio * self.place.feed_mm_per_s() / pace.speed;
+            self.step_s *= FEED_POINT_SPACING;
+            self.seen += 1;
+        }
+        self.most[..self.seen].get(number).copied()
+    }
+
+    /// Whether at the rate `sigma` no place ahead is too fast, which is mostly said by the first that is.
+    fn is_kept_at(&mut self, sigma: f64) -> bool {
+        sigma <= self.kept_rate
+            || (0..)
+                .map_while(|number| self.rate_at(number))
+                .all(|most| sigma < most)
+    }
+}
+
+/// Where a way has come, and whether it has been below the feed.
+#[derive(Clone, Copy, Debug)]
+struct Watch {
+    before: Option<Pace>,
+    limit_mm_per_s: f64,
+    was_below: bool,
+}
+
+impl Watch {
+    fn new(here: &RateState<'_>, ratio: f64) -> Self {
+        let before = here.place.pace();
+        let limit_mm_per_s = ratio * here.place.feed_mm_per_s();
+        let is_below = |pace: &Pace| here.sigma * pace.speed <= limit_mm_per_s * (1.0 + TOLERANCE);
+        Self {
+            was_below: before.as_ref().is_none_or(is_below),
+            before,
+            limit_mm_per_s,
+        }
+    }
+
+    /// Whether the feed is kept in a period that ends at `to`, at its end and in its mean. Where it was not before, it need not
+    /// be yet.
+    fn is_kept(&mut self, to: &RateState<'_>, ratio: f64, h: f64) -> bool {
+        let Some(pace) = to.place.pace() else {
+            self.before = None;
+            return true;
+        };
+        let limit = ratio * to.place.feed_mm_per_s();
+        let most = limit.max(self.limit_mm_per_s) * (1.0 + TOLERANCE);
+        let kept = to.sigma * pace.speed <= limit * (1.0 + TOLERANCE)
+            && self
+                .before
+                .is_none_or(|before| before.way_to_mm(&pace) <= most * h);
+        let was_below = self.was_below;
+        *self = Self {
+            before: Some(pace),
+            limit_mm_per_s: limit,
+            was_below: was_below || kept,
+        };
+        kept || !was_below
+    }
+}
+
+impl Governor {
+    /// The σ̈ nearest to `wanted` from which there is a way below the feed, with that way in `self.recovery`; `None` where none
+    /// is found.
+    pub(super) fn recoverable_below(
+        &mut self,
+        wanted: f64,
+        here: RateState<'_>,
+        below: &mut Below<'_>,
+        horizon: &Horizon,
+    ) -> Option<f64> {
+        let h = self.period_s;
+        self.steps_left = FEED_WAY_STEPS;
+        let range = self.range(&here, h, horizon)?;
+        let wanted = range.nearest(wanted);
+        if self.leaves_way_below(wanted, here, below, horizon) {
+            return Some(wanted);
+        }
+        let kept = self.recovery.peek().filter(|_| self.recovery.keeps_feed);
+        let (mut good, mut bad) = (
+            kept.unwrap_or(range.nearest(-MAX_LOWERING / (h * h))),
+            wanted,
+        );
+        let mut found = None;
+        for _ in 0..HALVINGS {
+            let between = f64::midpoint(good, bad);
+            if self.leaves_way_below(between, here, below, horizon) {
+                (good, found) = (between, Some(between));
+            } else {
+                bad = between;
+            }
+        }
+        found
+    }
+
+    /// Begins from rest, where any rate is as good, with one from which there is a way below the feed: the rate so far, or one
+    /// that is nearer to the one at which the plan keeps it everywhere.
+    pub(super) fn begin_kept(
+        &mut self,
+        mut here: RateState<'_>,
+        below: &mut Below<'_>,
+        horizon: &Horizon,
+    ) {
+        let above = self.sigma - below.kept_rate;
+        self.steps_left = BEGINNINGS * FEED_WAY_STEPS;
+        for halvings in 0..BEGINNINGS {
+            here.sigma = below.kept_rate + above / f64::from(1_u32 << halvings);
+            if self.leaves_way_below(0.0, here, below, horizon) {
+                self.sigma = here.sigma;
+                return;
+            }
+        }
+        self.jump(below.kept_rate);
+    }
+
+    /// Whether the next period of the way that was found last keeps the limits: where it was tried out some periods at a time, it
+    /// may go beyond them.
+    pub(super) fn keeps_limits_on(&self, here: &RateState<'_>, horizon: &Horizon) -> bool {
+        let range = self.range(here, self.period_s, horizon);
+        range.is_some_and(|range| {
+            let next = self.recovery.peek();
+            next.is_none_or(|next| {
+                (range.nearest(next) - next).abs() <= ROUNDED_SHARE * (range.high - range.low)
+            })
+        })
+    }
+
+    /// Whether after a period with σ̈ of `change` there is a way below the feed; it is noted in `self.recovery`.
+    fn leaves_way_below(
+        &mut self,
+        change: f64,
+        here: RateState<'_>,
+        below: &mut Below<'_>,
+        horizon: &Horizon,
+    ) -> bool {
+        let mut watch = Watch::new(&here, below.ratio);
+        let mut way = here;
+        way.pass(change, self.period_s);
+        let found = !turns_beyond(&here, change, self.period_s)
+            && watch.is_kept(&way, below.ratio, self.period_s)
+            && (self.becomes_constant((way, watch), below, horizon)
+                || self.becomes_slow(way, watch, below, horizon));
+        if found {
+            std::mem::swap(&mut self.recovery, &mut self.tried);
+            self.recovery.keeps_feed = true;
+        }
+        found
+    }
+
+    /// Most periods of a way.
+    fn most_periods(&self, horizon: &Horizon) -> u32 {
+        let [least, most] = FEED_WAY_PERIODS;
+        (FEED_WAY_RAMPS * horizon.reach_s / self.period_s).clamp(least, most) as u32
+    }
+
+    /// Whether σ becomes constant, soonest, at a rate at which no place ahead is too fast.
+    fn becomes_constant(
+        &mut self,
+        (mut way, mut watch): (RateState<'_>, Watch),
+        below: &mut Below<'_>,
+        horizon: &Horizon,
+    ) -> bool {
+        self.tried.clear();
+        let (mut passed, most) = (0, self.most_periods(horizon));
+        while passed < most && (0.0..=1.0).contains(&way.sigma) {
+            if way.rate_per_s == 0.0 {
+                return below.is_kept_at(way.sigma);
+            }
+            let periods = periods_of_step(passed);
+            let step_s = f64::from(periods) * self.period_s;
+            let steady = -way.rate_per_s / step_s;
+            let mut on = (&mut way, &mut watch);
+            if self
+                .go(&mut on, steady, (periods, below.ratio), horizon)
+                .is_none()
+            {
+                return false;
+            }
+            passed += periods;
+        }
+        false
+    }
+
+    /// Whether σ becomes constant at the rate at which the plan keeps the feed everywhere, lowered as far as the limits allow.
+    fn becomes_slow(
+        &mut self,
+        mut way: RateState<'_>,
+        mut watch: Watch,
+        below: &mut Below<'_>,
+        horizon: &Horizon,
+    ) -> bool {
+        self.tried.clear();
+        let (mut passed, most) = (0, self.most_periods(horizon));
+        let mut raisable = f64::INFINITY;
+        while passed < most && (0.0..=1.0).contains(&way.sigma) {
+            let (sigma, rate) = (way.sigma, way.rate_per_s);
+            // While σ̇ is brought to nothing.
+            let falling = rate * rate / (2.0 * raisable).max(f64::MIN_POSITIVE);
+            let is_enough = rate <= 0.0 && sigma - falling <= below.kept_rate;
+            if rate == 0.0 && is_enough {
+                return true;
+            }
+            let periods = periods_of_step(passed);
+            let step_s = f64::from(periods) * self.period_s;
+            let steady = -rate / step_s;
+            let wanted = if is_enough {
+                steady
+            } else {
+                // As low as leaves another such step to bring σ̇ to nothing.
+                let landing = LANDING_SHARE * below.kept_rate - sigma - 1.5 * step_s * rate;
+                (landing.max(-MAX_LOWERING) / (step_s * step_s)).min(steady)
+            };
+            let mut on = (&mut way, &mut watch);
+            let Some(range) = self.go(&mut on, wanted, (periods, below.ratio), horizon) else {
+                return false;
+            };
+            raisable = range.high.max(0.0);
+            passed += periods;
+        }
+        false
+    }
+
+    /// Goes on for some periods with the σ̈ nearest to `wanted`, and notes it; gives what the limits allow there. `None` where
+    /// they allow none, the feed is not kept, the plan is not known, or enough has been tried.
+    fn go(
+        &mut self,
+        (way, watch): &mut (&mut RateState<'_>, &mut Watch),
+        wanted: f64,
+        (periods, ratio): (u32, f64),
+        horizon: &Horizon,
+    ) -> Option<Interval> {
+        let step_s = f64::from(periods) * self.period_s;
+        self.steps_left = self.steps_left.checked_sub(1)?;
+        let range = self
+            .range(way, step_s, horizon)
+            .filter(|_| way.place.is_known())?;
+        let change = range.nearest(wanted);
+        if turns_beyond(way, change, step_s) {
+            return None;
+        }
+        for _ in 0..periods {
+            self.tried.push(change);
+        }
+        let is_steady = change == -way.rate_per_s / step_s;
+        let looks = periods.min(LOOKS);
+        for _ in 0..looks {
+            let look_s = step_s / f64::from(looks);
+            way.pass(change, look_s);
+            if !watch.is_kept(way, ratio, look_s) {
+                return None;
+            }
+        }
+        if is_steady {
+            way.rate_per_s = 0.0;
+        }
+        Some(range)
+    }
+}
+
+/// Whether σ turns round beyond an end of its range within a step with this σ̈.
+fn turns_beyond(from: &RateState<'_>, change: f64, step_s: f64) -> bool {
+    let rate = from.rate_per_s;
+    let turns = rate * (rate + step_s * change) < 0.0;
+    turns && !(0.0..=1.0).contains(&(from.sigma - rate * rate / (2.0 * change)))
+}
+
+/// How many periods the next step of a way lasts behind so many.
+fn periods_of_step(passed: u32) -> u32 {
+    (passed / FEED_WAY_SINGLE_PERIODS).max(1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan_ahead::{Ahead, derivatives};
+    use crate::steps::Recent;
+    use proptest::prelude::*;
+    use tandem_sdk::{AxisLimits, AxisVector, MAX_AXES, Segment};
+
+    /// X is slower than Y.
+    fn limits(acceleration: f64, slower: f64, jerk: f64) -> [AxisLimits; MAX_AXES] {
+        let axis = AxisLimits {
+            min_mm: -1000.0,
+            max_mm: 1000.0,
+            feed_mm_per_s: 1000.0,
+            rapid_mm_per_s: 1000.0,
+            acceleration_mm_per_s2: acceleration,
+            jerk_mm_per_s3: jerk,
+            speed_difference_mm_per_s: 0.0,
+        };
+        let mut limits = [axis; MAX_AXES];
+        limits[0].acceleration_mm_per_s2 *= slower;
+        limits[0].jerk_mm_per_s3 *= slower;
+        limits
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
+
+        /// X turns with much of its jerk, or all of it, which leaves little to lower σ with, while Y gets faster than the feed. From the
+        /// rate at which the plan keeps the feed everywhere σ rises, and no sample is beyond the feed or the jerk limit.
+        #[test]
+        fn where_an_axis_turns_before_the_plan_is_too_fast_no_sample_is_beyond_the_feed(
+            acceleration in 10.0..1000.0f64, building_s in 0.02..0.2f64, slower in 0.01..1.0f64, period_s in 5e-4..2e-3f64,
+            used in 0.3..1.0f64, gain in 0.5..4.0f64, long in 0.3..1.0f64, ratio in 0.2..2.0f64,
+        ) {
+            let jerk = acceleration / building_s;
+            let (turning, time_s) = (used * slower * jerk, long * building_s);
+            let from = turning * time_s * time_s / 4.0;
+            // What is driven of it ends before it does: the plan does not rest there.
+            let mut segment = Segment::rest(&AxisVector::ZERO, 1.5 * time_s);
+            segment.coefficients[0] = [0.0, from, 0.0, -turning / 6.0, 0.0, 0.0];
+            segment.coefficients[1] = [0.0, 0.0, gain * from / time_s / 2.0, 0.0, 0.0, 0.0];
+            segment.feed_mm_per_s = from;
+            let coefficients = segment.coefficients;
+            let speed_at = |t: f64| {
+                let [x, y] = [0, 1].map(|axis| derivatives(&coefficients[axis], t)[0]);
+                x.hypot(y)
+            };
+            let speeds = || (0..=1000).map(|step| speed_at(1.5 * time_s * f64::from(step) / 1000.0));
+            let fastest = speeds().fold(0.0, f64::max);
+            let kept_rate = 0.999 * (ratio * from / fastest).min(1.0);
+            // The path coordinate runs behind.
+            segment.path[1] = speeds().fold(f64::INFINITY, f64::min);
+            let limits = limits(acceleration, slower, jerk);
+            let (mut governor, mut horizon) = (Governor::new(&limits, 2, period_s), Horizon::new(&limits, 2, period_s));
+            governor.jump(kept_rate);
+            let (mut at_s, mut samples) = (0.0, Vec::new());
+            while at_s < time_s {
+                samples.push(segment.position(at_s));
+                let ahead = Ahead::new(&segment, Some(at_s), 0, None);
+                horizon.fill(&ahead, period_s);
+                let rise = (speed_at(at_s + 1e-6) - speed_at(at_s - 1e-6)) / 2e-6;
+                let aim = Aim {
+                    sigma: 1.0, speed_mm_per_s: ratio * from, ratio, kept_rate, path: [speed_at(at_s), rise, 0.0], rest_at: None,
+                };
+                let chosen = governor.smooth(&aim, &horizon, ahead.place((2, 0b11)), Recent::default());
+                prop_assert!(!chosen.relaxed && chosen.delta_s > 0.0, "{chosen:?} at {at_s} of {time_s} s");
+                at_s += chosen.delta_s;
+            }
+            let kept = time_s / kept_rate / period_s;
+            prop_assert!(samples.len() as f64 <= 1.2 * kept + 2.0, "{} periods where the rate so far takes {kept}", samples.len());
+            for (number, pair) in samples.windows(2).enumerate() {
+                let way = [0, 1].map(|axis| pair[1][axis] - pair[0][axis]);
+                let speed = way[0].hypot(way[1]) / period_s;
+                prop_assert!(speed <= ratio * from * (1.0 + 1e-6), "sample {number} of {}: {speed} for {}", samples.len(), ratio * from);
+            }
+            for (number, four) in samples.windows(4).enumerate() {
+                for (axis, limit) in limits[..2].iter().enumerate() {
+                    let change = four[3][axis] - 3.0 * four[2][axis] + 3.0 * four[1][axis] - four[0][axis];
+                    let asked = change.abs() / (period_s * period_s * period_s);
+                    let rounding = 1e-15 * four[3][axis].abs() / (period_s * period_s * period_s);
+                    prop_assert!(asked <= 1.01 * limit.jerk_mm_per_s3 + rounding, "sample {number}, axis {axis}: {asked} for {limit:?}");
+                }
+            }
+        }
+    }
+}
