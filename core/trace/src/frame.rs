@@ -145,3 +145,30 @@ fn checksum(seed: u32, first: u16, content: &[u8]) -> u32 {
     hasher.update(content);
     hasher.finalize()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_kind_of_a_record_and_its_length_are_under_its_checksum() {
+        let mut bytes = vec![];
+        put(Kind::Command, 3, 7, &mut bytes, |row| row.extend(b"text"));
+        let seeds = Seeds {
+            header: 7,
+            previous: None,
+        };
+        let found = get(&bytes, seeds).unwrap();
+        assert_eq!((found.kind, found.number), (Kind::Command, Some(3)));
+        // Two bits above the length say the kind: this is what a key would have.
+        bytes[1] ^= 0x80;
+        assert_eq!(get(&bytes, seeds), Err(Flaw::Wrong("the checksum differs")));
+        // As long as no record is.
+        bytes[1] |= 0x3f;
+        bytes.resize(1 << 15, 0);
+        assert_eq!(
+            get(&bytes, seeds),
+            Err(Flaw::Wrong("a record cannot be so long"))
+        );
+    }
+}
