@@ -346,13 +346,12 @@ fn pocket(state: &State, tool: Option<u32>) -> f64 {
 pub(crate) fn predefined_name(name: &[u8], state: &State, letters: &Letters) -> Option<f64> {
     let flag = |on: bool| f64::from(u8::from(on));
     Some(match name {
-        // What calls say of themselves has its value elsewhere; here it only cannot be assigned. There are no remaps.
-        b"_value" | b"_value_returned" | b"_call_level" | b"_remap_level" => 0.0,
+        // What calls say of themselves has its value elsewhere; here it only cannot be assigned. There are no remaps. The LinuxCNC
+        // whose language this is has the version 2.9.0.
+        b"_value" | b"_value_returned" | b"_call_level" | b"_remap_level" | b"_vminor" => 0.0,
+        b"_vmajor" => 2.9,
         // 0 in previews of LinuxCNC, which this interpreter has none of.
         b"_task" => 1.0,
-        // The LinuxCNC whose language this is.
-        b"_vmajor" => 2.9,
-        b"_vminor" => 0.0,
         b"_line" => f64::from(state.line),
         b"_motion_mode" => state.motion_code(),
         b"_plane" => match state.modes.plane {
