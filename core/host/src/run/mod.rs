@@ -149,21 +149,14 @@ impl Run {
         let mut squaring = None;
         if let Some(homing) = homing {
             let (machine, roster) = (&ready.machine, ready.claim.roster());
-            let made = Squaring::of(
+            squaring = Some(Squaring::of(
                 machine,
                 registry,
                 (homing, ready.switches),
                 (driver, &attached, &roster),
                 shared.clone(),
-            );
+            )?);
             driver = Box::new(NoDriver);
-            match made {
-                Ok(made) => squaring = Some(made),
-                Err((refused, mut driver)) => {
-                    let _ = driver.stop();
-                    return Err(refused);
-                }
-            }
         }
         let made = Made::of(ready, &attached, false, shared);
         let mut fine = Box::new(FineLoop::new(

@@ -46,15 +46,15 @@ impl Squaring {
     /// those of the run. Host; allocates.
     ///
     /// # Errors
-    /// The driver, behind what refuses: plugins, or the joints.
+    /// What plugins or joints refuse; the driver is stopped then.
     pub fn of(
         machine: &Machine,
         registry: &Registry,
         (homing, switches): (Lead, Switches),
         drives: (Box<dyn Driver>, &Attached, &Roster),
         shared: (Arc<Controls>, Arc<Status>),
-    ) -> Result<Self, (HostError, Box<dyn Driver>)> {
-        let (driver, attached, roster) = drives;
+    ) -> Result<Self, HostError> {
+        let (mut driver, attached, roster) = drives;
         let switches = Switches {
             unhomed: true,
             pause_at_stops: false,
@@ -73,7 +73,10 @@ impl Squaring {
         });
         let ready = match ready {
             Ok(ready) => ready,
-            Err(refused) => return Err((refused, driver)),
+            Err(refused) => {
+                let _ = driver.stop();
+                return Err(refused);
+            }
         };
         let made = Made::of(ready, attached, false, shared);
         let mut fine = FineLoop::new(&made.config, made.end, driver, made.kinematics);

@@ -10,6 +10,7 @@ use tandem_sdk::{Axes, AxisVector};
 
 /// The machine at one moment.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[allow(clippy::struct_excessive_bools, reason = "each is shown by itself")]
 pub struct StatusLine {
     /// State of the machine, as in traces.
     pub state: &'static str,

@@ -126,7 +126,7 @@ impl Scan {
             if !again {
                 match from {
                     From::FirstTiming => {
-                        window.whole = self.make_motion(job, &mut window.motion.rated)
+                        window.whole = self.make_motion(job, &mut window.motion.rated);
                     }
                     From::Found if n == 1 => self.follow_found(job, window),
                     From::Found => return false,
