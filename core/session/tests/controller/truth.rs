@@ -479,9 +479,10 @@ fn an_abort_in_any_of_the_last_periods_is_one() {
             let told = Told::by(&mill, says, |_| (), Box::new(NoKeeper));
             let acknowledged = told.answer(abort).get("ok").is_some();
             let (_, outcome) = told.jobs().pop().unwrap();
-            let (expected, is_on) = match acknowledged {
-                true => ("aborted", false),
-                false => ("done", by_hand),
+            let (expected, is_on) = if acknowledged {
+                ("aborted", false)
+            } else {
+                ("done", by_hand)
             };
             assert_eq!(outcome, expected, "{late}");
             let rpm = told.ok(after)["spindle_rpm"].as_f64().unwrap();
