@@ -57,7 +57,7 @@ fn errors(text: &str) -> Vec<String> {
     errors_on(&mill(), text)
 }
 
-/// Programs lie beside the subroutines that they call, as LinuxCNC's folder of programs has them; the machine's own come first.
+/// Programs lie beside the subroutines that they call, as `LinuxCNC`'s folder of programs has them; the machine's own come first.
 #[test]
 fn a_subroutine_is_looked_up_beside_its_program() {
     let (folder, mut config) = with_files(&[
@@ -103,7 +103,7 @@ fn a_wrong_block_of_a_subroutine_is_told_when_it_is_called() {
     );
 }
 
-/// LinuxCNC's `(ABORT, …)`: a subroutine that has found something wrong must not go on as if it had not.
+/// `LinuxCNC`'s `(ABORT, …)`: a subroutine that has found something wrong must not go on as if it had not.
 #[test]
 fn a_program_that_aborts_says_why() {
     let text = "o<check> sub\no1 if [#1 GT 2]\n( Abort, #1 mm are too much for #<_current_tool>)\no1 endif\n\

@@ -139,7 +139,7 @@ fn the_percent_sign_that_opens_a_program_may_be_followed_by_its_name() {
     }
 }
 
-/// Such comments come from FreeCAD's posts, where a name holds parentheses.
+/// Such comments come from `FreeCAD`'s posts, where a name holds parentheses.
 #[test]
 fn parentheses_that_close_too_often_end_their_comment() {
     for text in [
