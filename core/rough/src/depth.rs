@@ -355,19 +355,19 @@ mod tests {
     }
 
     /// A segment that leaves this deceleration, which is built up in this time, s.
-    fn built_up(segment: Segment, ramp_s: f64) -> Segment {
+    fn built_up(segment: &Segment, ramp_s: f64) -> Segment {
         Segment {
             max_sigma_rate_per_s: ramp_s,
             max_sigma_acceleration_per_s2: 1.0,
-            ..segment
+            ..*segment
         }
     }
 
     #[test]
     fn what_is_passed_no_longer_counts_and_what_builds_a_deceleration_up_does() {
         let mut depth = QueueDepth::new(0.01, 0.001, 1.0);
-        depth.push(&built_up(level(50.0, 100.0), 0.16), 1.0);
-        depth.push(&built_up(level(20.0, 1000.0), 0.04), 2.0);
+        depth.push(&built_up(&level(50.0, 100.0), 0.16), 1.0);
+        depth.push(&built_up(&level(20.0, 1000.0), 0.04), 2.0);
         let first_s = 0.5 / STOP_SHARE + 0.16 / STOP_JERK_SHARE + 0.02;
         assert!((depth.required_s() - first_s).abs() < 1e-12);
         assert_eq!((depth.stop_s(), depth.stop_ramp_s()), (0.5, 0.16));
