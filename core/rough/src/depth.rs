@@ -405,7 +405,7 @@ mod tests {
     fn a_deceleration_that_takes_time_to_build_up_lowers_the_rate_that_a_full_ring_allows() {
         let at_once = even(200, |_| ()).rate_for_wall(0.0, 0.4);
         assert_eq!(at_once, 1.0);
-        let slow = even(200, |last| *last = built_up(*last, 0.08));
+        let slow = even(200, |last| *last = built_up(last, 0.08));
         let before_s = 0.033 + 2.0 * 0.08 / STOP_JERK_SHARE;
         let half = 2.0 * STOP_SHARE * before_s;
         let expected = (half * half + 4.0 * STOP_SHARE * 0.4).sqrt() - half;
