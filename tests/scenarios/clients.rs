@@ -225,7 +225,7 @@ fn a_probe_in_a_pipe_holds_back_the_lines_behind_it() {
 #[test]
 fn jogs_are_lines_as_ever() {
     let served = Served::start();
-    let lines = "x+1 600\nwhere\nfoo\ny- 60000\nx+9999 600\ny- 600\nwait 0.1\nstop\nfeed-override 0.5\nquit\nx+1 600\n";
+    let lines = "x+1 600\nwhere\nfoo\ny- 60000\nx+9999 600\ny- 600\nwait 0.5\nstop\nfeed-override 0.5\nquit\nx+1 600\n";
     let jogged = served.run(&["jog"], lines);
     assert_eq!(jogged.status.code(), Some(1));
     let (out, err) = (text(&jogged.stdout), text(&jogged.stderr));

@@ -166,8 +166,8 @@ fn wait(mut child: Child) -> std::io::Result<Output> {
     child.wait_with_output()
 }
 
-/// How often [`wait`] looks, 2 ms apart at least.
-const PATIENCE: u32 = 30_000;
+/// How often [`wait`] looks, 2 ms apart at least: a busy computer takes a minute for what takes seconds elsewhere.
+const PATIENCE: u32 = 150_000;
 
 impl Done {
     /// Exit status.
