@@ -280,7 +280,7 @@ impl Run {
             (Squared::Thread(thread), _) => {
                 let timed = squaring::follow(&mut soft_loop, thread, periods)?;
                 measured = Some((timed.timing, timed.page_faults));
-                timed.body.fine
+                timed.body.running.fine
             }
             (Squared::Failed(fine, why), _) => {
                 words = Some(why);

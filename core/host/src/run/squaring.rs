@@ -14,7 +14,7 @@ use tandem_sdk::{Attached, Driver, Event};
 use super::job::{Job, Made};
 use crate::clock::periods::Body;
 use crate::clock::virtual_clock;
-use crate::clock::wall_clock::{Ended, Periods, TimedThread, give_room};
+use crate::clock::wall_clock::{Ended, FineBody, Periods, TimedThread, give_room};
 use crate::drives::Roster;
 use crate::error::HostError;
 use crate::joints::apart::Apart;
@@ -128,10 +128,9 @@ impl Squaring {
         soft_loop.step();
         let has_ended = Arc::<AtomicBool>::default();
         let body = Relay {
-            fine,
+            running: FineBody { fine, watch },
             next: Some(next),
             has_ended: Arc::clone(&has_ended),
-            watch,
         };
         let thread = TimedThread::start(body, periods.fine_ns, periods.fine_thread)?;
         for note in &thread.notes {
@@ -149,7 +148,7 @@ impl Squaring {
             tell_abort(&soft_loop);
             return Ok(Squared::Thread(thread));
         }
-        let fine = thread.join()?.body.fine;
+        let fine = thread.join()?.body.running.fine;
         let words = fine.fault().map_or_else(String::new, |fault| {
             conclusion.words(&fault, &fine, soft_loop.soft_cause(), None)
         });
@@ -188,41 +187,40 @@ pub fn follow(
 
 /// One loop, and behind its end the other, in one thread: the drives miss no period in between.
 pub struct Relay {
-    pub fine: Box<FineLoop>,
+    pub running: FineBody,
     /// Until it has taken over; then the one before, which the host drops.
     next: Option<Box<FineLoop>>,
     has_ended: Arc<AtomicBool>,
-    watch: Option<FineWatch>,
 }
 
 impl Body for Relay {
     fn is_over(&self) -> bool {
-        self.fine.is_over()
+        self.running.is_over()
     }
 
     fn begin(&self) -> Option<FineRuns> {
-        self.watch.as_ref().map(FineWatch::begin)
+        self.running.begin()
     }
 
     fn period(&mut self) {
+        let fine = &mut self.running.fine;
         if !self.has_ended.load(Ordering::Relaxed)
-            && self.fine.has_ended()
+            && fine.has_ended()
             && let Some(next) = &mut self.next
         {
-            next.succeed(&mut self.fine, false);
-            std::mem::swap(next, &mut self.fine);
+            next.succeed(fine, false);
+            std::mem::swap(next, fine);
             self.has_ended.store(true, Ordering::Release);
         }
-        self.fine.tick();
-        tandem_sdk::abi::beat();
+        self.running.period();
     }
 
     fn phase_ns(&self) -> Option<i64> {
-        self.fine.phase_ns()
+        self.running.phase_ns()
     }
 
     fn missed(&mut self, periods: u64, in_a_row: u64) {
-        self.fine.missed(periods, in_a_row);
+        self.running.missed(periods, in_a_row);
     }
 }
 
