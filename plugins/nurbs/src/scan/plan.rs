@@ -52,8 +52,6 @@ pub struct Scan {
     window: Window<Ramps>,
     /// What was found from the first timing.
     found: Window<Driven>,
-    /// Share of the jerk limits that is used.
-    jerk_share: f64,
 }
 
 /// The motion in pseudo-time along which a rate is sought.
@@ -61,6 +59,22 @@ pub struct Scan {
 enum From {
     FirstTiming,
     Found,
+}
+
+impl From {
+    fn tries(self) -> usize {
+        match self {
+            Self::FirstTiming => TRIES,
+            Self::Found => REFINING_TRIES,
+        }
+    }
+
+    fn jerk_share(self) -> f64 {
+        match self {
+            Self::FirstTiming => JERK_SHARE,
+            Self::Found => REFINING_JERK_SHARE,
+        }
+    }
 }
 
 impl Planning for Scan {
@@ -87,8 +101,7 @@ impl Scan {
     /// The window at the rate that the limits allow; false where no try keeps them.
     fn plan_rate(&mut self, job: &Job<Driven>, window: &mut Window<Driven>) -> bool {
         self.slowdowns.keep_first(0);
-        self.jerk_share = JERK_SHARE;
-        if !self.keeps(job, window, From::FirstTiming, TRIES) {
+        if !self.keeps(job, window, From::FirstTiming) {
             return false;
         }
         if is_gentle(job.bounds) {
@@ -102,8 +115,7 @@ impl Scan {
     fn refine(&mut self, job: &Job<Driven>, window: &mut Window<Driven>) {
         std::mem::swap(window, &mut self.found);
         let known = self.slowdowns.count();
-        self.jerk_share = REFINING_JERK_SHARE;
-        let kept = self.keeps(job, window, From::Found, REFINING_TRIES);
+        let kept = self.keeps(job, window, From::Found);
         if !kept || window.duration_s() >= self.found.duration_s() {
             std::mem::swap(window, &mut self.found);
         }
@@ -111,13 +123,8 @@ impl Scan {
     }
 
     /// Tries rates until limits are kept, one that begins at a motion and others that take something back; false where none does.
-    fn keeps(
-        &mut self,
-        job: &Job<Driven>,
-        window: &mut Window<Driven>,
-        from: From,
-        tries: usize,
-    ) -> bool {
+    fn keeps(&mut self, job: &Job<Driven>, window: &mut Window<Driven>, from: From) -> bool {
+        let tries = from.tries();
         // The last try whose samples keep the limits, where single points do not.
         let mut kept = None;
         for n in 1..=tries {
@@ -132,7 +139,7 @@ impl Scan {
                     From::Found => return false,
                 }
             }
-            self.solve(job, again, window);
+            self.solve(job, (from, again), window);
             if n == 1 && from == From::FirstTiming {
                 self.begun_s = self.first.end().0;
             }
@@ -169,7 +176,7 @@ impl Scan {
                     self.grid.ease(&self.slowdowns);
                 }
             }
-            self.solve(job, false, window);
+            self.solve(job, (from, false), window);
             return !self.dips(job, window)
                 && check(job, window, Look::Segments, &mut self.slowdowns).is_kept();
         }
@@ -231,14 +238,19 @@ impl Scan {
     }
 
     /// A rate on the motion there is, from the rate before where that was about the same.
-    fn solve(&mut self, job: &Job<Driven>, again: bool, window: &mut Window<Driven>) {
+    fn solve(
+        &mut self,
+        job: &Job<Driven>,
+        (from, again): (From, bool),
+        window: &mut Window<Driven>,
+    ) {
         window.motion.by_ramps = false;
         let motion = &mut window.motion.rated;
         let begin = if job.rests() { End::Rest } else { End::Moving };
         let task = Task {
             points: &self.grid.points,
             between: &self.grid.between,
-            limits: limits(job.bounds, self.jerk_share),
+            limits: limits(job.bounds, from.jerk_share()),
             step_s: motion.step_s,
             ends: (begin, End::Rest),
         };
