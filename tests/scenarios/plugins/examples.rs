@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::Command;
 
 use crate::harness::{Scenario, root};
-use crate::plugins::built::third_party;
+use crate::plugins::built::{built_in, third_party};
 
 const LINES: &str =
     "G21 G90\nF3000\nG1 X40 Y10\nG4 P0.1\nG1 X0.01\nG0 X-30 Y-20 Z5\nG1 X0 Y0 Z0\nM2\n";
@@ -162,6 +162,46 @@ fn all_of_them_conform() {
             "{out}"
         );
         assert!(out.contains("allocation: not judged"), "{out}");
+    }
+}
+
+/// An arm does not reach everywhere within 200 mm of zero: it is judged where it is said to work.
+#[test]
+fn an_arm_is_judged_on_its_work_area() {
+    let library = built_in("tandem-scara");
+    let library = library.to_str().unwrap();
+    let check = |more: &[&str]| {
+        let arm = [
+            "plugin",
+            "check",
+            library,
+            "--set",
+            "upper_arm_mm=300",
+            "--set",
+            "forearm_mm=250",
+            "--set",
+            "shoulder_mm=[0, -350]",
+        ];
+        tandem(&[&arm[..], more].concat())
+    };
+    let (status, out, err) = check(&["--work-area=-150,150,-100,100,-50,50"]);
+    assert_eq!(status, 0, "{out}{err}");
+    assert!(out.contains("ok     there and back"), "{out}");
+    for elsewhere in [&[][..], &["--work-area", "-150,150,100,300,-50,50"]] {
+        let (status, out, _) = check(elsewhere);
+        assert_eq!(status, 1, "{out}");
+        assert!(out.contains("the arm does not reach that far"), "{out}");
+    }
+    for wrong in [
+        "-150,150,-100,100,-50",
+        "-150,150,100,-100,-50,50",
+        "-150,150,-100,100,-50,inf",
+        "-150,150,-100,100,-50,50,0",
+        "",
+    ] {
+        let (status, _, err) = check(&[&format!("--work-area={wrong}")]);
+        assert_eq!(status, 2, "{wrong}: {err}");
+        assert!(err.contains("from low to high"), "{wrong}: {err}");
     }
 }
 
