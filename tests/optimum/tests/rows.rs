@@ -33,12 +33,31 @@ fn smooth_at_a_micrometre_is_near_the_exact_curve() {
     assert!(middle < 1.08 && worst < 1.25, "{middle} {worst}");
 }
 
+/// At a jump of curvature what is over the jerk limit goes with the square of the speed: taken from the jerk beside it, no try kept
+/// the limits of these curves, and they were driven by ramps.
+#[test]
+fn curves_are_not_left_to_ramps_for_a_jump_of_curvature() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, seeds) in [
+        ("scan-jumps-gentle", [1016, 1018]),
+        ("scan-jumps-paper", [1014, 1036]),
+    ] {
+        let row = rows().into_iter().find(|row| row.name == name).unwrap();
+        for seed in seeds {
+            let result = row.run(seed, folder.path()).unwrap();
+            let ratio = result.time_s / result.best_s;
+            assert_eq!(result.verdict, "clean", "{name} {seed}");
+            assert!(ratio < 1.05, "{name} {seed}: {ratio}");
+        }
+    }
+}
+
 #[test]
 fn scan_is_near_the_shortest_time() {
     for (name, most, greatest) in [
         ("scan-paper", 1.01, 1.03),
         ("scan-gentle", 1.04, 1.06),
-        ("scan-jumps-gentle", 1.13, 1.25),
+        ("scan-jumps-gentle", 1.03, 1.05),
     ] {
         let (middle, worst) = ratios(name);
         assert!(

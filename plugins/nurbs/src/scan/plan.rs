@@ -20,11 +20,11 @@ const REFINING_JERK_SHARE: f64 = 0.99;
 /// Share of the acceleration limits that is used: between the places asked for it changes a little.
 const ACCELERATION_SHARE: f64 = 0.99;
 /// Tries.
-const TRIES: usize = 8;
+const TRIES: usize = 10;
 /// Tries of a window that is planned once more.
 const REFINING_TRIES: usize = 3;
 /// Tries after which limits of samples are to be kept, or never will.
-const HOPELESS: usize = 6;
+const HOPELESS: usize = 8;
 /// A solution so short, or that takes more than this share of the ramps it began with, is compared with ramps that keep
 /// every limit.
 const SHORT_S: f64 = 0.15;

@@ -31,6 +31,10 @@ pub const BINDS: [(LimitedBy, f64); 5] = [
 /// Share of the acceleration beyond which turning is to blame, whose acceleration goes with the square of the speed.
 const TURNING: f64 = 0.85;
 
+/// Share of the jerk limit from which on a jump of curvature is to blame for what samples around it exceed, and what is aimed at.
+const STEPPED: f64 = 0.1;
+const STEPPED_AIM: f64 = 0.98;
+
 /// Where a motion has no value the speed is lowered on so much of the path, mm.
 const LOST_MM: f64 = 0.05;
 
@@ -169,10 +173,13 @@ pub fn check<M: Motion, N>(
             } else {
                 0.0
             };
-            slowdowns.add(
-                known,
-                here.slowdown(before_mm[0] - beside_mm, state.s_mm + beside_mm),
-            );
+            let mut part = here.slowdown(before_mm[0] - beside_mm, state.s_mm + beside_mm);
+            if here.jerk > 1.0 {
+                let ends_mm = [before_mm[0], state.s_mm];
+                let shown = shown_at_knots(route, bounds, ends_mm, state.speed_mm_per_s);
+                part = blame_step(part, here.jerk, shown);
+            }
+            slowdowns.add(known, part);
         }
         worst.join(&here);
         before_mm = [before_mm[1], before_mm[2], state.s_mm];
@@ -277,6 +284,37 @@ fn judge_last(
     };
     slowdowns.add(known, worst.slowdown(from_mm, to_mm));
     worst
+}
+
+/// The largest share of the jerk limits that jumps of curvature between two path coordinates show where they are passed at a speed.
+fn shown_at_knots(
+    route: &Route,
+    bounds: &Bounds,
+    [mut from_mm, to_mm]: [f64; 2],
+    speed_mm_per_s: f64,
+) -> f64 {
+    let mut cursor = Cursor::default();
+    let mut most = 0.0f64;
+    while let Some((knot_mm, sides)) = route.knot([from_mm, to_mm], &mut cursor) {
+        let left = Leg::jerk_left_at_step(&sides, speed_mm_per_s, f64::INFINITY, bounds);
+        most = most.max(1.0 - left);
+        from_mm = knot_mm;
+    }
+    most
+}
+
+/// Where a jump of curvature shows a share of the jerk, what is over goes with the square of the speed there: less jerk beside it
+/// would be less of a small part.
+fn blame_step(part: Slowdown, jerk: f64, shown: f64) -> Slowdown {
+    if shown < STEPPED {
+        return part;
+    }
+    let speed = (1.0 - (jerk - STEPPED_AIM) / shown).max(0.5).sqrt();
+    Slowdown {
+        speed: part.speed.min(speed),
+        jerk: 1.0,
+        ..part
+    }
 }
 
 /// What a sample leaves for a stop.
