@@ -56,7 +56,7 @@ fn curves_are_not_left_to_ramps_for_a_jump_of_curvature() {
 fn scan_is_near_the_shortest_time() {
     for (name, most, greatest) in [
         ("scan-paper", 1.01, 1.03),
-        ("scan-gentle", 1.04, 1.06),
+        ("scan-gentle", 1.012, 1.02),
         ("scan-jumps-gentle", 1.03, 1.05),
     ] {
         let (middle, worst) = ratios(name);

@@ -203,9 +203,9 @@ impl Grid {
     }
 
     /// Leaves a little more at the start: what the window before does there cannot be changed, and it was asked for at other
-    /// places.
-    pub fn yield_at_start(&mut self) {
-        let count = YIELDING.min(self.points.len());
+    /// places. The intervals are so many times finer than usual.
+    pub fn yield_at_start(&mut self, finer: usize) {
+        let count = (finer * YIELDING).min(self.points.len());
         let more = self
             .between
             .iter_mut()

@@ -13,16 +13,18 @@ use crate::stream::slowdown::Slowdowns;
 use crate::stream::{Bounds, Job, Motion as _, Planning, Window, lay_times, longest_s};
 use crate::windowed::{Ramps, Windowed};
 
-/// Share of the jerk limits that is used.
+/// Share of the jerk limits that is used: along the first timing, and along the motion that was found on it.
 const JERK_SHARE: f64 = 0.975;
-/// The same of a window that is planned once more: where more than this exceeds the limit between the places, what was found stays.
-const REFINING_JERK_SHARE: f64 = 0.99;
+const FOUND_JERK_SHARE: f64 = 0.996;
 /// Share of the acceleration limits that is used: between the places asked for it changes a little.
 const ACCELERATION_SHARE: f64 = 0.99;
+/// How much finer the grid is on a motion that was found.
+const FINER: usize = 2;
+/// How often what was found is followed at most, and the share of its time that it has to come to for another time.
+const FOLLOWED: usize = 4;
+const FASTER: f64 = 0.98;
 /// Tries.
 const TRIES: usize = 10;
-/// Tries of a window that is planned once more.
-const REFINING_TRIES: usize = 3;
 /// Tries after which limits of samples are to be kept, or never will.
 const HOPELESS: usize = 8;
 /// A solution so short, or that takes more than this share of the ramps it began with, is compared with ramps that keep
@@ -62,17 +64,18 @@ enum From {
 }
 
 impl From {
-    fn tries(self) -> usize {
-        match self {
-            Self::FirstTiming => TRIES,
-            Self::Found => REFINING_TRIES,
-        }
-    }
-
     fn jerk_share(self) -> f64 {
         match self {
             Self::FirstTiming => JERK_SHARE,
-            Self::Found => REFINING_JERK_SHARE,
+            Self::Found => FOUND_JERK_SHARE,
+        }
+    }
+
+    /// How much finer the grid is than usual.
+    fn finer(self) -> usize {
+        match self {
+            Self::FirstTiming => 1,
+            Self::Found => FINER,
         }
     }
 }
@@ -100,34 +103,46 @@ impl Planning for Scan {
 impl Scan {
     /// The window at the rate that the limits allow; false where no try keeps them.
     fn plan_rate(&mut self, job: &Job<Driven>, window: &mut Window<Driven>) -> bool {
+        if is_gentle(job.bounds) && self.plan_twice(job, window) {
+            return true;
+        }
         self.slowdowns.keep_first(0);
-        if !self.keeps(job, window, From::FirstTiming) {
-            return false;
-        }
-        if is_gentle(job.bounds) {
-            self.refine(job, window);
-        }
-        true
+        self.keeps(job, window, From::FirstTiming)
     }
 
-    /// Plans the window once more, from the motion that was found: at rates near 1 less of a limit is lost to its linear form. What is
-    /// no faster, or does not keep the limits, is left.
-    fn refine(&mut self, job: &Job<Driven>, window: &mut Window<Driven>) {
-        std::mem::swap(window, &mut self.found);
-        let known = self.slowdowns.count();
-        let kept = self.keeps(job, window, From::Found);
-        if !kept || window.duration_s() >= self.found.duration_s() {
-            std::mem::swap(window, &mut self.found);
+    /// A rate along the first timing, whatever that exceeds between the places of its grid, and another one along the motion that was
+    /// found: at rates near 1 less of a limit is lost to its linear form. False where no try of the second keeps the limits.
+    fn plan_twice(&mut self, job: &Job<Driven>, window: &mut Window<Driven>) -> bool {
+        self.slowdowns.keep_first(0);
+        window.whole = self.make_motion(job, &mut window.motion.rated);
+        self.solve(job, (From::FirstTiming, false), window);
+        self.begun_s = self.first.end().0;
+        let rate = &window.motion.rated.rate;
+        let is_motion = (0..rate.intervals()).all(|k| rate.least(k).1 > 0.0);
+        if !is_motion || !window.duration_s().is_finite() || self.crawls(job, window) {
+            return false;
         }
-        self.slowdowns.keep_first(known);
+        self.keeps(job, window, From::Found)
+    }
+
+    /// The rate along the motion of `window`, and along what comes of that, as long as it becomes much faster.
+    fn follow(&mut self, job: &Job<Driven>, window: &mut Window<Driven>) {
+        for _ in 0..FOLLOWED {
+            std::mem::swap(window, &mut self.found);
+            self.follow_found(job, window);
+            self.solve(job, (From::Found, false), window);
+            let duration_s = window.duration_s();
+            if !duration_s.is_finite() || duration_s > FASTER * self.found.duration_s() {
+                break;
+            }
+        }
     }
 
     /// Tries rates until limits are kept, one that begins at a motion and others that take something back; false where none does.
     fn keeps(&mut self, job: &Job<Driven>, window: &mut Window<Driven>, from: From) -> bool {
-        let tries = from.tries();
         // The last try whose samples keep the limits, where single points do not.
         let mut kept = None;
-        for n in 1..=tries {
+        for n in 1..=TRIES {
             let known = self.slowdowns.count();
             let again = n > 1 && self.grid.ease(&self.slowdowns);
             if !again {
@@ -135,11 +150,15 @@ impl Scan {
                     From::FirstTiming => {
                         window.whole = self.make_motion(job, &mut window.motion.rated);
                     }
-                    From::Found if n == 1 => self.follow_found(job, window),
-                    From::Found => return false,
+                    From::Found if n == 1 => {}
+                    From::Found => self.follow_found(job, window),
                 }
             }
-            self.solve(job, (from, again), window);
+            if n == 1 && from == From::Found {
+                self.follow(job, window);
+            } else {
+                self.solve(job, (from, again), window);
+            }
             if n == 1 && from == From::FirstTiming {
                 self.begun_s = self.first.end().0;
             }
@@ -154,7 +173,7 @@ impl Scan {
                 }
                 continue;
             }
-            if n == tries
+            if n == TRIES
                 || !ease(
                     job.route,
                     job.bounds,
@@ -273,7 +292,7 @@ impl Scan {
     fn make_motion(&mut self, job: &Job<Driven>, motion: &mut Rated) -> bool {
         let whole = self.first.make(job, &self.slowdowns);
         let (total_s, end_mm) = self.first.end();
-        let intervals = intervals(total_s, job.bounds);
+        let intervals = intervals(total_s, job.bounds, From::FirstTiming);
         motion.step_s = total_s / intervals as f64;
         let grid = (intervals, motion.step_s);
         fill(
@@ -283,7 +302,7 @@ impl Scan {
             &job.start.state,
             end_mm,
         );
-        self.lay(job, motion, intervals);
+        self.lay(job, motion, intervals, From::FirstTiming);
         whole
     }
 
@@ -291,7 +310,7 @@ impl Scan {
     fn follow_found(&mut self, job: &Job<Driven>, window: &mut Window<Driven>) {
         let found = &self.found;
         let total_s = found.duration_s();
-        let intervals = intervals(total_s, job.bounds);
+        let intervals = intervals(total_s, job.bounds, From::Found);
         let motion = &mut window.motion.rated;
         motion.step_s = total_s / intervals as f64;
         let at = |t_s: f64| {
@@ -306,21 +325,22 @@ impl Scan {
             found.motion.end_mm(),
         );
         window.whole = found.whole;
-        self.lay(job, motion, intervals);
+        self.lay(job, motion, intervals, From::Found);
     }
 
-    fn lay(&mut self, job: &Job<Driven>, motion: &Rated, intervals: usize) {
+    fn lay(&mut self, job: &Job<Driven>, motion: &Rated, intervals: usize, from: From) {
         self.grid
             .lay(job.route, job.bounds, motion, intervals, &self.slowdowns);
         if !job.rests() {
-            self.grid.yield_at_start();
+            self.grid.yield_at_start(from.finer());
         }
     }
 }
 
 /// Intervals of the grid for a motion of `total_s`.
-fn intervals(total_s: f64, bounds: &Bounds) -> usize {
-    ((total_s / grid_s(bounds)).ceil() as usize).clamp(MIN_INTERVALS, MAX_INTERVALS)
+fn intervals(total_s: f64, bounds: &Bounds, from: From) -> usize {
+    ((from.finer() as f64 * total_s / grid_s(bounds)).ceil() as usize)
+        .clamp(MIN_INTERVALS, MAX_INTERVALS)
 }
 
 /// A time that is long for the way of a window from rest, s: several times that of a line. The first timing says nothing of hairpins

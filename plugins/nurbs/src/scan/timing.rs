@@ -74,7 +74,16 @@ impl Timing {
         }
         let a = self.steps[*at];
         let b = self.steps[*at + 1];
-        a.1 + (b.1 - a.1) * ((t_s - a.0) / (b.0 - a.0)).clamp(0.0, 1.0)
+        let share = ((t_s - a.0) / (b.0 - a.0)).clamp(0.0, 1.0);
+        // To rest it comes with the jerk alone, as it leaves it.
+        let way = if *at + 2 == self.steps.len() {
+            1.0 - (1.0 - share).powi(3)
+        } else if *at == 0 && self.nodes[0].speed_mm_per_s == 0.0 {
+            share.powi(3)
+        } else {
+            share
+        };
+        a.1 + (b.1 - a.1) * way
     }
 
     /// Nodes with their caps, and the pass forward, until the time of the window has gone by.
