@@ -15,9 +15,12 @@ use tandem_sdk::{
 
 use crate::polygon::{Polygon, Timed};
 
-/// Blocks of a polygon before the rounds that are timed, and in those at least.
+/// Blocks of a polygon before the rounds that are timed.
 const BEFORE_BLOCKS: u32 = 8;
-const TIMED_BLOCKS: u32 = 12;
+/// Blocks in those at least: to find where to begin, and to tell the axes apart. A round differs from the next by some percent where
+/// limits are unequal, because windows of the plan end at another place of it.
+const FEW_BLOCKS: u32 = 12;
+const MANY_BLOCKS: u32 = 60;
 /// Program time that the planner is asked for at once, s, and calls without any after which it is stuck.
 const PART_S: f64 = 0.1;
 const MOST_IDLE: u32 = 4;
@@ -139,11 +142,16 @@ struct Part {
 }
 
 impl<'a> Bench<'a> {
-    /// The polygons that were `timed`, on a machine like `machine` with room for them.
+    /// The polygons that were `timed`, on a machine like `machine` with room for them, with so many blocks of each in the middle.
     ///
     /// # Errors
     /// They are no program that the machine reads.
-    pub fn new(machine: &Machine, registry: &'a Registry, timed: &[Timed]) -> Result<Self, String> {
+    pub fn new(
+        machine: &Machine,
+        registry: &'a Registry,
+        timed: &[Timed],
+        blocks: u32,
+    ) -> Result<Self, String> {
         let mut machine = machine.clone();
         for axis in &mut machine.limits.axes {
             (axis.min_mm, axis.max_mm) = (-ROOM_MM, ROOM_MM);
@@ -162,7 +170,7 @@ impl<'a> Bench<'a> {
             let Polygon {
                 corners, rounds, ..
             } = timed.polygon;
-            let middle = TIMED_BLOCKS.div_ceil(corners);
+            let middle = blocks.div_ceil(corners);
             let around = (2 * BEFORE_BLOCKS).div_ceil(corners);
             let driven = (middle + around).min(rounds);
             let shorter = Polygon {
@@ -309,6 +317,10 @@ const PROBE: f64 = 0.03;
 /// Share by which the sum of the squares is to fall for another step, and for constants of each axis to be worth their number.
 const WORTH: f64 = 1e-2;
 const WORTH_OF_AXES: f64 = 0.8;
+/// How unequal two axes are where the search for that begins.
+const ASKEW: [f64; 3] = [0.6, 1.0, 1.0 / 0.6];
+/// Two axes exchanged are a start worth a search where they leave less than so many times the squares.
+const TURNED: f64 = 4.0;
 /// Polygons this near to their feed tell nothing of the limits.
 const AT_FEED: f64 = 0.998;
 
@@ -373,9 +385,9 @@ pub fn fit(
     if telling.len() < 6 {
         telling = timed.to_vec();
     }
-    let bench = Bench::new(machine, registry, &telling)?;
-    let fit = Fit {
-        bench: &bench,
+    let bench = |timed: &[Timed], blocks| Bench::new(machine, registry, timed, blocks);
+    let rough = Fit {
+        bench: &bench(&telling, FEW_BLOCKS)?,
         timed: &telling,
     };
     let one = Form {
@@ -385,35 +397,47 @@ pub fn fit(
     // Where to begin a third of them says as well.
     let some: Vec<Timed> = telling.iter().step_by(3).copied().collect();
     let few = Fit {
-        bench: &Bench::new(machine, registry, &some)?,
+        bench: &bench(&some, FEW_BLOCKS)?,
         timed: &some,
     };
-    let (alike, square) = fit.near(one, &few.start(one, &Planned::of(machine, kind)));
+    let (alike, _) = rough.near(one, &few.start(one, &Planned::of(machine, kind)));
+    let fine = Fit {
+        bench: &bench(&telling, MANY_BLOCKS)?,
+        timed: &telling,
+    };
     let each = Form {
         kind,
         by_axes: true,
     };
-    let mut found = (alike.clone(), square);
-    // Which axis is the weaker one the polygons tell, which lie askew.
-    let starts = [0.6f64, 1.0 / 0.6].map(|factor| {
-        let mut start = alike.clone();
-        for values in [&mut start.acceleration_mm_per_s2, &mut start.jerk_mm_per_s3] {
-            (values[0], values[1]) = (values[0] * factor, values[1] / factor);
-        }
-        (fit.square(&start), start)
-    });
-    let better = starts
-        .iter()
-        .min_by(|(one, _), (other, _)| one.total_cmp(other));
-    if let Some((_, start)) = better {
-        let of_axes = fit.near(each, start);
+    let mut found = alike.clone();
+    let square = fine.square(&alike);
+    // Which axis is the weaker one the polygons tell, which lie askew; it may be so in one limit and not in the other.
+    let factors = ASKEW.iter().flat_map(|a| ASKEW.map(|j| [*a, j]));
+    let counts = |[a, j]: &[f64; 2]| match kind {
+        PlannerKind::Smooth => [*a, *j] != [1.0; 2],
+        PlannerKind::BlockOverlap => *a != 1.0 && *j == 1.0,
+    };
+    let starts = factors
+        .filter(counts)
+        .map(|factors| rough.askew(&alike, factors));
+    if let Some((_, start)) = starts.min_by(|(one, _), (other, _)| one.total_cmp(other)) {
+        let of_axes = fine.near(each, &start);
+        // Two axes exchanged make nearly the same times.
+        let mut turned = of_axes.0.clone();
+        turned.acceleration_mm_per_s2.swap(0, 1);
+        turned.jerk_mm_per_s3.swap(0, 1);
+        let of_axes = if fine.square(&turned) < TURNED * of_axes.1 {
+            let other = fine.near(each, &turned);
+            if other.1 < of_axes.1 { other } else { of_axes }
+        } else {
+            of_axes
+        };
         if of_axes.1 < WORTH_OF_AXES.powi(2) * square {
-            found = of_axes;
+            found = of_axes.0;
         }
     }
-    let all = Bench::new(machine, registry, timed)?;
-    let times_s = all.times_s(&found.0)?;
-    Ok((found.0, times_s))
+    let times_s = bench(timed, MANY_BLOCKS)?.times_s(&found)?;
+    Ok((found, times_s))
 }
 
 /// What is fitted to what.
@@ -463,6 +487,25 @@ impl Fit<'_> {
         best.map_or(from.clone(), |(_, start)| start)
     }
 
+    /// `alike` with two unequal axes whose times are as long in the mean, and the squares that it leaves.
+    fn askew(&self, alike: &Planned, [a, j]: [f64; 2]) -> (f64, Planned) {
+        let mut start = alike.clone();
+        let unequal = |limits: &mut [f64; MAX_AXES], factor: f64| {
+            (limits[0], limits[1]) = (limits[0] * factor, limits[1] / factor);
+        };
+        unequal(&mut start.acceleration_mm_per_s2, a);
+        unequal(&mut start.jerk_mm_per_s3, j);
+        let Some(residuals) = self.residuals(&start) else {
+            return (f64::INFINITY, start);
+        };
+        let mean = residuals.iter().sum::<f64>() / residuals.len() as f64;
+        // Times go with the square root of accelerations, and with the cube root of jerks.
+        start.acceleration_mm_per_s2 = start.acceleration_mm_per_s2.map(|a| a * (2.0 * mean).exp());
+        start.jerk_mm_per_s3 = start.jerk_mm_per_s3.map(|j| j * (3.0 * mean).exp());
+        let squares = residuals.iter().map(|r| (r - mean).powi(2)).sum();
+        (squares, start)
+    }
+
     /// The constants of `form` that fit best near `start`, and the sum of the squares that they leave: damped Gauss-Newton steps.
     fn near(&self, form: Form, start: &Planned) -> (Planned, f64) {
         let first = form.logs(start);
@@ -473,6 +516,13 @@ impl Fit<'_> {
         let square = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>();
         let mut damping = 1e-2;
         'steps: for _ in 0..MOST_STEPS {
+            if std::env::var_os("DBG").is_some() {
+                eprintln!(
+                    "near {:.5} {}",
+                    square(&here),
+                    form.planned(&logs).constants()
+                );
+            }
             let mut jacobian = DMatrix::zeros(here.len(), logs.len());
             for index in 0..logs.len() {
                 let mut moved = logs.clone();

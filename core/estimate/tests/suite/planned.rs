@@ -5,8 +5,8 @@ use std::path::Path;
 use tandem_estimate::diagnose::{Fitted, fit_all};
 use tandem_estimate::experiment::Experiment;
 use tandem_estimate::measurements;
-use tandem_estimate::planned::{PlannerKind, fit};
-use tandem_estimate::polygon::Timed;
+use tandem_estimate::planned::{Bench, Planned, PlannerKind, fit};
+use tandem_estimate::polygon::{Polygon, Timed};
 use tandem_estimate::{Choice, estimate, model_file};
 use tandem_gcode::Program;
 use tandem_host::{Clock, Registry, Switches};
@@ -205,6 +205,39 @@ fn a_control_that_bounds_jerk_is_found_from_noisy_readings() {
             println!("{name}, {noise}: median {median:.4}, worst {worst:.4}");
             assert!(median <= 0.01 && worst <= 0.02, "{name}: {median} {worst}");
         }
+    }
+}
+
+/// Block-overlap, which plans fast: two axes of unequal acceleration are told apart from readings that are 1 % off.
+#[test]
+fn axes_of_unequal_acceleration_are_told_apart() {
+    let (mut random, own, registry) = (Random::from_the_clock(), machine(&[]), with_planners());
+    let polygon = |(corners, side_mm)| Timed {
+        polygon: Polygon {
+            corners,
+            side_mm,
+            rounds: 120 / corners,
+        },
+        feed_mm_per_s: 5000.0 / 60.0,
+        time_s: 1.0,
+        reading_error_s: 0.0,
+    };
+    let each = [3, 4, 5, 6, 8, 9, 12, 18].map(|n| [1.0, 2.0, 4.0].map(|side_mm| (n, side_mm)));
+    let mut timed: Vec<Timed> = each.into_iter().flatten().map(polygon).collect();
+    let mut real = Planned::of(&own, PlannerKind::BlockOverlap);
+    let weaker = random.length(150.0, 300.0);
+    real.acceleration_mm_per_s2[..2].copy_from_slice(&[3.0 * weaker, weaker]);
+    let bench = Bench::new(&own, &registry, &timed, 120).unwrap();
+    for (timed, time_s) in timed.iter_mut().zip(bench.times_s(&real).unwrap()) {
+        timed.time_s = time_s * (1.0 + 0.01 * random.between(-1.0, 1.0));
+    }
+    let (found, _) = fit(&own, &registry, &timed, PlannerKind::BlockOverlap).unwrap();
+    println!("of {}: {}", real.constants(), found.constants());
+    for (found, real) in found.acceleration_mm_per_s2[..2]
+        .iter()
+        .zip(real.acceleration_mm_per_s2)
+    {
+        assert!((found / real - 1.0).abs() < 0.1, "{found} {real}");
     }
 }
 
