@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use serde_json::{Map, Value, json};
 
@@ -11,7 +11,9 @@ use super::desk::{Answered, Desk, From};
 use super::request::{Asked, read};
 use super::words::word_of;
 use crate::grbl::{Sender, Settings};
-use crate::operator::{Answer, House, Lease, MAX_OWNERS, News, Problem, Role, Talk, Tokens};
+use crate::operator::{
+    Answer, House, Lease, MAX_OWNERS, News, Problem, Rhythm, Role, Talk, Tokens,
+};
 
 /// The protocol's number, in the greeting.
 const PROTOCOL: u32 = 2;
@@ -97,8 +99,7 @@ struct Waiting {
 
 /// Status lines that a client has asked for.
 struct Subscription {
-    every: Duration,
-    due: Instant,
+    rhythm: Rhythm,
     /// These fields alone; all where it names none.
     fields: Vec<String>,
     /// Only what is otherwise than in the line before.
@@ -314,8 +315,7 @@ impl Protocol2 {
             return Err(format!("the status has no field \"{none}\""));
         }
         self.subscription = (rate_hz != 0.0).then(|| Subscription {
-            every: Duration::from_secs_f64(1.0 / rate_hz),
-            due: now,
+            rhythm: Rhythm::new(rate_hz, self.client, now),
             fields,
             changes: asked.is_on("changes"),
             before: Map::new(),
@@ -428,19 +428,16 @@ impl Talk for Protocol2 {
     }
 
     fn is_due(&mut self, now: Instant) -> bool {
-        let Some(due) = self.subscription.as_mut().filter(|of| of.due <= now) else {
-            return false;
-        };
-        // After a stall the rate starts anew: what was missed is not made up for.
-        due.due = (due.due + due.every).max(now);
-        true
+        self.subscription
+            .as_mut()
+            .is_some_and(|of| of.rhythm.is_due(now))
     }
 
     fn due(&self) -> Option<Instant> {
         // What has waited is gone on with at once; the end of what waits for a disk rings.
         let waits = self.clerk.as_ref().is_some_and(Clerk::is_busy) || self.behind.is_empty();
         let now = (!waits).then(Instant::now);
-        [now, self.subscription.as_ref().map(|of| of.due)]
+        [now, self.subscription.as_ref().map(|of| of.rhythm.due())]
             .into_iter()
             .flatten()
             .min()

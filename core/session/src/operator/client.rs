@@ -162,9 +162,6 @@ impl Client {
             let line = self.session.turn(lease, now);
             self.take(&Answer { line, last: false }, now);
         }
-        if self.phase == Phase::Talking && self.session.is_due(now) {
-            self.outbox.telemetry(|lost| self.session.telemetry(lost));
-        }
         self.send(now);
         let most = if self.phase == Phase::Talking {
             TOKEN_WITHIN
@@ -177,6 +174,16 @@ impl Client {
         if self.phase != Phase::Talking {
             lease.release(self.number());
         }
+    }
+
+    /// Sends the status line that is due, if one is; whether one was.
+    pub fn show_status(&mut self, now: Instant) -> bool {
+        let is_due = self.phase == Phase::Talking && self.session.is_due(now);
+        if is_due {
+            self.outbox.telemetry(|lost| self.session.telemetry(lost));
+            self.send(now);
+        }
+        is_due
     }
 
     /// The run is over: its last line.

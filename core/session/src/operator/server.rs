@@ -94,6 +94,8 @@ struct Room {
     lease: Lease,
     /// Clients that ever came.
     comers: u64,
+    /// The place among the clients at which the next status line that is due is looked for.
+    next_shown: usize,
 }
 
 impl Room {
@@ -106,6 +108,7 @@ impl Room {
             clients: vec![],
             lease: Lease::default(),
             comers: 0,
+            next_shown: 0,
         }
     }
 
@@ -125,19 +128,13 @@ impl Room {
         self.farewell();
     }
 
-    /// Serves each client once. A panic costs the client in whose handling it happened.
+    /// Serves each client once.
     fn round(&mut self, now: Instant) {
         for at in 0..self.clients.len() {
             let has_place = has_place(&self.clients, self.clients[at].door, Standing::Owner);
-            let (lease, client) = (&mut self.lease, &mut self.clients[at]);
-            let served = catch_unwind(AssertUnwindSafe(|| client.serve(lease, has_place, now)));
-            if served.is_err() {
-                let failed = catch_unwind(AssertUnwindSafe(|| client.fail(lease, now)));
-                if failed.is_err() {
-                    client.drop_now();
-                }
-            }
+            self.guarded(at, now, |client, lease| client.serve(lease, has_place, now));
         }
+        self.show_status(now);
         for (number, news) in self.lease.news() {
             if let Some(client) = self
                 .clients
@@ -159,6 +156,36 @@ impl Room {
                 .filter(|client| client.is_talking())
                 .count(),
         );
+    }
+
+    /// Serves a client with `serve`. A panic costs the client in whose handling it happened.
+    fn guarded<R>(
+        &mut self,
+        at: usize,
+        now: Instant,
+        serve: impl FnOnce(&mut Client, &mut Lease) -> R,
+    ) -> Option<R> {
+        let (lease, client) = (&mut self.lease, &mut self.clients[at]);
+        let served = catch_unwind(AssertUnwindSafe(|| serve(client, lease)));
+        if served.is_err() {
+            let failed = catch_unwind(AssertUnwindSafe(|| client.fail(lease, now)));
+            if failed.is_err() {
+                client.drop_now();
+            }
+        }
+        served.ok()
+    }
+
+    /// Sends one status line that is due: whoever asks meanwhile is answered before the next one.
+    fn show_status(&mut self, now: Instant) {
+        let count = self.clients.len();
+        for step in 0..count {
+            let at = (self.next_shown + step) % count;
+            if self.guarded(at, now, |client, _| client.show_status(now)) != Some(false) {
+                self.next_shown = at + 1;
+                return;
+            }
+        }
     }
 
     /// Hands out what nobody has asked for in this moment.

@@ -161,3 +161,30 @@ fn the_lease_is_taken_over_from_whoever_holds_it_by_an_explicit_request() {
     );
     assert!(room.ask(&mut other, r#"{"command":"resume"}"#, now)["ok"].is_object());
 }
+
+#[test]
+fn whoever_asks_is_answered_before_the_status_lines_of_all_the_others() {
+    let (mut room, now) = (room(), Instant::now());
+    let mut watchers: Vec<_> = (0..14).map(|_| room.friend(now)).collect();
+    for watcher in &mut watchers {
+        writeln!(watcher.get_mut(), r#"{{"subscribe":{{"rate_hz":50}}}}"#).unwrap();
+    }
+    let mut friend = room.friend(now);
+    // Everybody has subscribed in this round, and one of them has its first line.
+    assert!(room.ask(&mut friend, r#"{"status":{}}"#, now)["ok"].is_object());
+    let owed = |room: &Room| {
+        let due = room.clients.iter().filter_map(Client::due);
+        due.filter(|due| *due <= now).count()
+    };
+    assert_eq!(owed(&room), 13);
+    assert!(room.ask(&mut friend, r#"{"status":{}}"#, now)["ok"].is_object());
+    assert_eq!(owed(&room), 12);
+    for _ in 0..12 {
+        room.round(now);
+    }
+    assert_eq!(owed(&room), 0);
+    for watcher in &mut watchers {
+        assert!(hear(watcher)["ok"].is_object());
+        assert_eq!(hear(watcher)["lost"], 0);
+    }
+}

@@ -1,7 +1,7 @@
 //! One client's conversation, without its socket.
 
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use serde_json::json;
 use tandem_host::Command;
@@ -10,6 +10,7 @@ use super::hub::OperatorHub;
 use super::lease::{ANSWER_WITHIN, Lease};
 use super::reply::{self, Problem};
 use super::request::{LeaseWord, Request, parse};
+use super::rhythm::Rhythm;
 use super::role::Role;
 use super::token::Tokens;
 use crate::jog::JogMessage;
@@ -37,13 +38,7 @@ pub struct Session {
     /// Whether its door has a place for one more who has named the token.
     pub has_place: bool,
     lines: u64,
-    subscription: Option<Subscription>,
-}
-
-#[derive(Debug)]
-struct Subscription {
-    every: Duration,
-    due: Instant,
+    subscription: Option<Rhythm>,
 }
 
 impl Session {
@@ -121,17 +116,14 @@ impl Session {
 
     /// Whether a status line is due now.
     pub fn is_due(&mut self, now: Instant) -> bool {
-        let Some(subscription) = self.subscription.as_mut().filter(|s| s.due <= now) else {
-            return false;
-        };
-        // After a stall the rate starts anew: what was missed is not made up for.
-        subscription.due = (subscription.due + subscription.every).max(now);
-        true
+        self.subscription
+            .as_mut()
+            .is_some_and(|rhythm| rhythm.is_due(now))
     }
 
     /// When the next status line is due.
     pub fn due(&self) -> Option<Instant> {
-        self.subscription.as_ref().map(|s| s.due)
+        self.subscription.as_ref().map(Rhythm::due)
     }
 
     fn introduce(&mut self, expected: &Tokens, request: &Request) -> Answer {
@@ -175,8 +167,7 @@ impl Session {
                 "no token is asked for here".to_string(),
             )),
             Request::Subscribe(rate_hz) => {
-                let every = rate_hz.map(|rate_hz| Duration::from_secs_f64(1.0 / rate_hz));
-                self.subscription = every.map(|every| Subscription { every, due: now });
+                self.subscription = rate_hz.map(|rate_hz| Rhythm::new(rate_hz, self.client, now));
                 Ok(reply::ok(
                     &json!({ "subscribe": { "rate_hz": rate_hz.unwrap_or(0.0) } }),
                 ))
