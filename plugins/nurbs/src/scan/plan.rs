@@ -18,8 +18,9 @@ const JERK_SHARE: f64 = 0.975;
 const FOUND_JERK_SHARE: f64 = 0.996;
 /// Share of the acceleration limits that is used: between the places asked for it changes a little.
 const ACCELERATION_SHARE: f64 = 0.99;
-/// How much finer the grid is on a motion that was found.
-const FINER: usize = 2;
+/// How much finer the grid is on a motion that was found, and along a first timing whose motion is only followed.
+const FINER: f64 = 2.0;
+const COARSER: f64 = 0.6;
 /// How often what was found is followed at most, and the share of its time that it has to come to for another time.
 const FOLLOWED: usize = 4;
 const FASTER: f64 = 0.98;
@@ -60,21 +61,24 @@ pub struct Scan {
 #[derive(Clone, Copy, PartialEq)]
 enum From {
     FirstTiming,
+    /// The same, where what is found is only followed.
+    Roughly,
     Found,
 }
 
 impl From {
     fn jerk_share(self) -> f64 {
         match self {
-            Self::FirstTiming => JERK_SHARE,
+            Self::FirstTiming | Self::Roughly => JERK_SHARE,
             Self::Found => FOUND_JERK_SHARE,
         }
     }
 
     /// How much finer the grid is than usual.
-    fn finer(self) -> usize {
+    fn finer(self) -> f64 {
         match self {
-            Self::FirstTiming => 1,
+            Self::FirstTiming => 1.0,
+            Self::Roughly => COARSER,
             Self::Found => FINER,
         }
     }
@@ -114,8 +118,8 @@ impl Scan {
     /// found: at rates near 1 less of a limit is lost to its linear form. False where no try of the second keeps the limits.
     fn plan_twice(&mut self, job: &Job<Driven>, window: &mut Window<Driven>) -> bool {
         self.slowdowns.keep_first(0);
-        window.whole = self.make_motion(job, &mut window.motion.rated);
-        self.solve(job, (From::FirstTiming, false), window);
+        window.whole = self.make_motion((job, From::Roughly), &mut window.motion.rated);
+        self.solve(job, (From::Roughly, false), window);
         self.begun_s = self.first.end().0;
         let rate = &window.motion.rated.rate;
         let is_motion = (0..rate.intervals()).all(|k| rate.least(k).1 > 0.0);
@@ -130,7 +134,11 @@ impl Scan {
         for _ in 0..FOLLOWED {
             std::mem::swap(window, &mut self.found);
             self.follow_found(job, window);
-            self.solve(job, (From::Found, false), window);
+            // In its own time the rate is about 1.
+            let rate = &mut window.motion.rated.rate.coefficients;
+            rate.clear();
+            rate.resize(self.grid.points.len() + 2, 1.0);
+            self.solve(job, (From::Found, true), window);
             let duration_s = window.duration_s();
             if !duration_s.is_finite() || duration_s > FASTER * self.found.duration_s() {
                 break;
@@ -147,8 +155,8 @@ impl Scan {
             let again = n > 1 && self.grid.ease(&self.slowdowns);
             if !again {
                 match from {
-                    From::FirstTiming => {
-                        window.whole = self.make_motion(job, &mut window.motion.rated);
+                    From::FirstTiming | From::Roughly => {
+                        window.whole = self.make_motion((job, from), &mut window.motion.rated);
                     }
                     From::Found if n == 1 => {}
                     From::Found => self.follow_found(job, window),
@@ -188,8 +196,8 @@ impl Scan {
         if let Some(known) = kept {
             self.slowdowns.keep_first(known);
             match from {
-                From::FirstTiming => {
-                    window.whole = self.make_motion(job, &mut window.motion.rated);
+                From::FirstTiming | From::Roughly => {
+                    window.whole = self.make_motion((job, from), &mut window.motion.rated);
                 }
                 From::Found => {
                     self.grid.ease(&self.slowdowns);
@@ -289,10 +297,10 @@ impl Scan {
     }
 
     /// The motion in pseudo-time; gives whether it goes to the end.
-    fn make_motion(&mut self, job: &Job<Driven>, motion: &mut Rated) -> bool {
+    fn make_motion(&mut self, (job, from): (&Job<Driven>, From), motion: &mut Rated) -> bool {
         let whole = self.first.make(job, &self.slowdowns);
         let (total_s, end_mm) = self.first.end();
-        let intervals = intervals(total_s, job.bounds, From::FirstTiming);
+        let intervals = intervals(total_s, job.bounds, from);
         motion.step_s = total_s / intervals as f64;
         let grid = (intervals, motion.step_s);
         fill(
@@ -302,7 +310,7 @@ impl Scan {
             &job.start.state,
             end_mm,
         );
-        self.lay(job, motion, intervals, From::FirstTiming);
+        self.lay(job, motion, intervals, from);
         whole
     }
 
@@ -332,15 +340,14 @@ impl Scan {
         self.grid
             .lay(job.route, job.bounds, motion, intervals, &self.slowdowns);
         if !job.rests() {
-            self.grid.yield_at_start(from.finer());
+            self.grid.yield_at_start(from.finer().ceil() as usize);
         }
     }
 }
 
 /// Intervals of the grid for a motion of `total_s`.
 fn intervals(total_s: f64, bounds: &Bounds, from: From) -> usize {
-    ((from.finer() as f64 * total_s / grid_s(bounds)).ceil() as usize)
-        .clamp(MIN_INTERVALS, MAX_INTERVALS)
+    ((from.finer() * total_s / grid_s(bounds)).ceil() as usize).clamp(MIN_INTERVALS, MAX_INTERVALS)
 }
 
 /// A time that is long for the way of a window from rest, s: several times that of a line. The first timing says nothing of hairpins
