@@ -104,7 +104,6 @@ mod way_below;
 
 use feeds_ahead::FeedsAhead;
 use keep_limits::Recovery;
-pub use order3::Aim;
 pub use rest_at::RestAt;
 
 use tandem_sdk::{AxisLimits, MAX_AXES};
@@ -113,6 +112,23 @@ use crate::period_points::PeriodPoints;
 
 /// Relative tolerance within which a plan is at its limit, not beyond it.
 const TOLERANCE: f64 = 1e-6;
+
+/// What is asked of the coming period.
+#[derive(Clone, Copy, Debug)]
+pub struct Aim {
+    /// Rate of program time to reach.
+    pub sigma: f64,
+    /// Path speed not to exceed, mm/s.
+    pub speed_mm_per_s: f64,
+    /// Share of the programmed feeds ahead that is not to be exceeded there; infinite where the plan keeps what is asked.
+    pub ratio: f64,
+    /// Rate at which the plan keeps that share wherever it is.
+    pub kept_rate: f64,
+    /// Derivatives of the plan's path coordinate here by program time.
+    pub path: [f64; 3],
+    /// Where to rest.
+    pub rest_at: Option<RestAt>,
+}
 
 /// The rate of program time.
 #[derive(Debug)]

@@ -12,10 +12,9 @@
 //! σ begins with a rate that lasts for six periods and leaves such a way. Speed is that of the linear axes where they move more
 //! than the path coordinate, which is a polynomial of its own and may run behind.
 
-use super::Governor;
 use super::keep_limits::RateState;
-use super::order3::Aim;
 use super::tuning::{FEED_SHARE, MAX_LOWERING, RISE_JERK_SHARE, RISE_PERIODS};
+use super::{Aim, Governor};
 use crate::horizon::Horizon;
 
 /// Rounds in which σ̈ is sought: what is wrong is squared by each.

@@ -3,35 +3,17 @@
 //! With q the plan in program time an axis jerks by `q‴σ³ + 3q″σσ̇ + q′σ̈`. What is chosen for a period is σ̈: as near to
 //! what two laws ask for as leaves a way on which σ̇ comes to zero within the limits (`keep_limits.rs`).
 
-use super::Governor;
 use super::interval::{Interval, RateAt};
 use super::keep_limits::RateState;
-use super::rest_at::RestAt;
 use super::tuning::{
     APPROACH_END_FACTOR, CLEARLY_LONGER, EXCESSES, ORDER3_LIMIT_SHARE, SNAP_SHARE,
 };
 use super::way_below::Below;
+use super::{Aim, Governor};
 use crate::horizon::Horizon;
 use crate::law::{stop_s, to_rest};
 use crate::plan_ahead::PlanCursor;
 use crate::steps::{Recent, Steps};
-
-/// What is asked of the coming period.
-#[derive(Clone, Copy, Debug)]
-pub struct Aim {
-    /// Rate of program time to reach.
-    pub sigma: f64,
-    /// Path speed not to exceed, mm/s.
-    pub speed_mm_per_s: f64,
-    /// Share of the programmed feeds ahead that is not to be exceeded there; infinite where the plan keeps what is asked.
-    pub ratio: f64,
-    /// Rate at which the plan keeps that share wherever it is.
-    pub kept_rate: f64,
-    /// Derivatives of the plan's path coordinate here by program time.
-    pub path: [f64; 3],
-    /// Where to rest.
-    pub rest_at: Option<RestAt>,
-}
 
 /// What was chosen for the period.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -7,14 +7,13 @@
 //! axis which turns leaves nothing to lower σ with just before the plan is too fast: a rate from which it would have to be
 //! lowered there is never reached. The way that was found is kept, and is gone where the next period finds no better one.
 
-use super::Governor;
 use super::interval::Interval;
 use super::keep_limits::RateState;
-use super::order3::Aim;
 use super::tuning::{
     FEED_POINT_MIN_RATE, FEED_POINT_SPACING, FEED_WAY_PERIODS, FEED_WAY_RAMPS,
     FEED_WAY_SINGLE_PERIODS, FEED_WAY_STEPS, MAX_LOWERING,
 };
+use super::{Aim, Governor};
 use crate::horizon::Horizon;
 use crate::plan_ahead::{Pace, PlanCursor};
 

@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering::Relaxed;
 use tandem_rings::Queued;
 use tandem_sdk::{AxisVector, EventKind};
 
-use super::govern::{Ratios, Request};
+use super::govern::{Ask, Ratios, Request};
 use super::spindle::SpinUp;
 use super::{FineLoop, Phase};
 use crate::config::GuardMode;
@@ -14,16 +14,6 @@ use crate::fault::FaultKind;
 use crate::guard::Checked;
 use crate::outputs::Waits;
 use crate::state::Input;
-
-/// Why the rate of program time is to go down.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Ask {
-    Run,
-    Hold,
-    /// For good: an edge has come, or the operator aborts.
-    Stop,
-    Starve,
-}
 
 impl FineLoop {
     /// Follows the plan for one period.

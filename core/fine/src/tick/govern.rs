@@ -6,7 +6,6 @@ use crate::governor::tuning::{
 };
 use tandem_rings::STOP_SHARE;
 
-use super::follow::Ask;
 use crate::config::{FineConfig, GuardMode};
 use crate::cursor::Cursor;
 use crate::governor::{Aim, Governor};
@@ -14,6 +13,16 @@ use crate::horizon::Horizon;
 use crate::law::Along;
 use crate::period_points::PeriodPoints;
 use crate::slowdowns::{LineEnd, Slowdown, Slowdowns};
+
+/// Why the rate of program time is to go down.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Ask {
+    Run,
+    Hold,
+    /// For good: an edge has come, or the operator aborts.
+    Stop,
+    Starve,
+}
 
 /// The feed ratios that count now.
 #[derive(Clone, Copy, Debug)]

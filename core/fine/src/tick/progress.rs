@@ -7,7 +7,7 @@
 //! four times that, and by then far more than one period of program time has passed.
 
 use super::FineLoop;
-use super::follow::Ask;
+use super::govern::Ask;
 use crate::config::FineConfig;
 use crate::cursor::Reached;
 use crate::fault::FaultKind;

@@ -13,7 +13,7 @@ use std::sync::atomic::Ordering::Relaxed;
 use tandem_rings::{MachineState, Rest, RestCause, StopCause};
 use tandem_sdk::{Arm, AxisVector, Edge};
 
-use super::follow::Ask;
+use super::govern::Ask;
 use super::{FineLoop, Phase};
 use crate::edge::arm_for;
 use crate::fault::FaultKind;

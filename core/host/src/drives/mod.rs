@@ -2,6 +2,7 @@
 
 mod at_rest;
 mod composite;
+mod no_driver;
 mod roster;
 mod share;
 mod slow;
@@ -14,6 +15,7 @@ use crate::joints::JointSpace;
 use crate::plugins::registry::{PluginRefusal, Registry};
 use at_rest::AtRest;
 use composite::{Composite, Part};
+pub(crate) use no_driver::NoDriver;
 pub use roster::{Entry, Roster};
 use share::Share;
 use slow::Slow;

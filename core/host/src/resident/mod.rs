@@ -16,12 +16,9 @@ use tandem_policy::Parameter as PolicyParameter;
 use tandem_recorder::Summary;
 use tandem_rings::{Controls, Status};
 use tandem_rough::Source;
-use tandem_sdk::{
-    Attached, AxisVector, Block, Curve, Driver, DriverContext, DriverDescription, Feedback,
-    PluginError, Setpoint,
-};
+use tandem_sdk::{Attached, AxisVector, Block, Curve, Driver};
 
-use crate::drives::Roster;
+use crate::drives::{NoDriver, Roster};
 use crate::error::HostError;
 use crate::joints::JointSpace;
 use crate::joints::apart::{Apart, Joined};
@@ -674,36 +671,5 @@ impl<'r> Resident<'r> {
                 "driver {titles}: the drives were not let go of: {e}"
             ))
         })
-    }
-}
-
-/// Stands in a loop until it takes over the drives.
-pub(crate) struct NoDriver;
-
-impl Driver for NoDriver {
-    fn describe(&self) -> DriverDescription {
-        DriverDescription::simulated()
-    }
-
-    fn open(&mut self, _context: &DriverContext) -> Result<(), PluginError> {
-        Ok(())
-    }
-
-    fn start(&mut self) -> Result<Attached, PluginError> {
-        Ok(Attached::default())
-    }
-
-    fn exchange(
-        &mut self,
-        _setpoint: &Setpoint,
-        _feedback: &mut Feedback,
-    ) -> Result<(), PluginError> {
-        Ok(())
-    }
-
-    fn quick_stop(&mut self) {}
-
-    fn stop(&mut self) -> Result<(), PluginError> {
-        Ok(())
     }
 }
