@@ -398,6 +398,10 @@ mod tests {
         assert!(rate < 0.5, "{rate}");
         let rests = even(20, |last| last.flags = SegmentFlags::ENDS_AT_REST);
         assert_eq!(rests.rate_for_wall(0.0, 0.04), 1.0);
+        let dwells = even(20, |last| last.flags = SegmentFlags::DWELL);
+        assert_eq!(dwells.rate_for_wall(0.0, 0.04), 1.0);
+        let only_says_so = even(20, |last| last.duration_s = 0.0);
+        assert_eq!(only_says_so.rate_for_wall(0.0, 0.04), 1.0);
     }
 
     /// The rate r at which `r²/(2·0.95)` is what 2 per s brake away of the 0.4 s, less `r` times what passes before.

@@ -232,3 +232,14 @@ fn what_the_program_states_holds_from_its_place_on_however_windows_fall() {
         assert_eq!(*seen.lock().unwrap(), expected, "{at_once} at once");
     }
 }
+
+#[test]
+fn more_can_come_from_a_window_or_from_the_source() {
+    let mut script = Script::of(vec![Ok((0..70).map(block).collect())]);
+    script.waits_for_rest = true;
+    let mut source = Tuned::new(script, Recorder::default());
+    assert!(!source.may_go_on(false), "the source waits for a rest");
+    assert!(source.may_go_on(true));
+    source.next_items(&mut vec![]).unwrap();
+    assert!(source.may_go_on(false), "six blocks are left of what came");
+}

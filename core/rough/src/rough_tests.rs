@@ -234,3 +234,50 @@ fn what_a_sender_has_sent_is_driven_as_far_as_it_is_known_before_its_end_is_plan
         "{now_s} of {whole_s} s"
     );
 }
+
+/// A file: a line whenever it is asked for more, without end.
+struct File(Arc<AtomicU64>);
+
+impl Source for File {
+    fn next_items(&mut self, items: &mut Vec<Item>) -> Result<bool, String> {
+        items.push(block(self.0.fetch_add(1, Relaxed)));
+        Ok(true)
+    }
+    fn provide_input(&mut self, _value: f64) {}
+    fn provide_rest(&mut self, _rest: &Rest) -> bool {
+        true
+    }
+}
+
+/// Takes no more than two blocks for each time that it emits.
+struct Few(u64);
+
+impl Plans for Few {
+    fn accept(&mut self, _block: &Block) -> Accepted {
+        if self.0 == 2 {
+            return Accepted::Full;
+        }
+        self.0 += 1;
+        Accepted::Accepted
+    }
+    fn advance(&mut self, duration_s: f64, sink: &mut dyn SegmentSink) -> (f64, bool) {
+        self.0 = 0;
+        piece(duration_s, SegmentFlags::default(), sink);
+        (duration_s, false)
+    }
+}
+
+#[test]
+fn a_file_is_read_no_further_while_the_queue_is_deep() {
+    let read = Arc::new(AtomicU64::new(0));
+    let planner = Box::new(Fake(Few(0)));
+    let (rough, _fine, _host) = bridge(Sizes::default());
+    let config = RoughConfig::new(ROUGH_PERIOD_S, ROUGH_PERIOD_S);
+    let file = Box::new(File(Arc::clone(&read)));
+    let mut rough = RoughLoop::new(config, file, planner, rough);
+    rough.step(&mut ()).unwrap();
+    let first = read.load(Relaxed);
+    assert!(first > 0);
+    (0..10).for_each(|_| assert!(rough.step(&mut ()).is_ok()));
+    assert_eq!(read.load(Relaxed), first, "nothing was driven since");
+}

@@ -171,4 +171,19 @@ mod tests {
             Err(Flaw::Wrong("a record cannot be so long"))
         );
     }
+
+    #[test]
+    fn the_longest_record_is_read() {
+        let mut bytes = vec![];
+        let row = MAX_FRAME_BYTES - HEAD_BYTES - MARKER.len() - 8;
+        put(Kind::Key, 3, 7, &mut bytes, |to| {
+            to.resize(to.len() + row, 1);
+        });
+        assert_eq!(bytes.len(), MAX_FRAME_BYTES);
+        let seeds = Seeds {
+            header: 7,
+            previous: None,
+        };
+        assert_eq!(get(&bytes, seeds).unwrap().length, MAX_FRAME_BYTES);
+    }
 }

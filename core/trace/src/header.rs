@@ -212,3 +212,26 @@ impl<'a> Body<'a> {
         Axes::new(&axes).map_err(|_| "its axes are none of a machine's")
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_body_whose_period_is_no_time_is_refused() {
+        let header = |fine_period_s| Header {
+            fine_period_s,
+            axes: Axes::new(&[('X', false)]).unwrap(),
+            machine: "m".into(),
+            program: "p".into(),
+            planner: "look-ahead".into(),
+            signals: vec![],
+            dry_run: false,
+        };
+        assert!(Header::parse(&header(0.001).body(), FORMAT).is_ok());
+        for none_s in [0.0, -0.001, f64::INFINITY, f64::NAN] {
+            let parsed = Header::parse(&header(none_s).body(), FORMAT);
+            assert_eq!(parsed.unwrap_err(), "its period is none");
+        }
+    }
+}
