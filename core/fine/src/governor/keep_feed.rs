@@ -16,6 +16,7 @@ use super::keep_limits::RateState;
 use super::tuning::{FEED_SHARE, MAX_LOWERING, RISE_JERK_SHARE, RISE_PERIODS};
 use super::{Aim, Governor};
 use crate::horizon::Horizon;
+use crate::plan_ahead::PlanCursor;
 
 /// Rounds in which σ̈ is sought: what is wrong is squared by each.
 const ROUNDS: u32 = 5;
@@ -42,6 +43,18 @@ impl Curve {
     }
 }
 
+/// Whether the plan stands still in the period or to the end of its segment, which a dwell may reach within the period. A move that
+/// begins at rest gets on, and at the end of a segment there is nothing left to pass.
+fn is_in_dwell(place: &PlanCursor<'_>, h: f64) -> bool {
+    let mut soon = *place;
+    let passes_time = place.stretch_s(h) > 0.0;
+    soon.advance(h);
+    passes_time
+        && place.pace().zip(soon.pace()).is_some_and(|(from, to)| {
+            to.speed <= 0.0 && to.path_mm == from.path_mm && from.way_to_mm(&to) == 0.0
+        })
+}
+
 impl Governor {
     /// σ̈ that brings the rate to the one aimed at, as far as the path speed stays below the feed here and ahead.
     pub(super) fn wanted_below(
@@ -52,11 +65,10 @@ impl Governor {
     ) -> f64 {
         let h = self.period_s;
         if aim.path[0] <= 0.0 {
-            let mut soon = here.place;
-            soon.go(h);
             let goal = aim.sigma.min(aim.ratio);
-            if self.sigma < goal && soon.pace().is_some_and(|pace| pace.speed <= 0.0) {
-                // A hold in a dwell has taken the rate to nothing, and a dwell has no speed that says how fast it is to pass.
+            if self.sigma < goal && (self.sigma == 0.0 || is_in_dwell(&here.place, h)) {
+                // A hold in a dwell, or the end of what was queued, has taken the rate to nothing, and a dwell has no speed that
+                // says how fast it is to pass.
                 return self.small(self.freely(goal, horizon), horizon);
             }
             // From rest the rate was chosen for what follows.
