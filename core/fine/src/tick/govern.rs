@@ -258,13 +258,24 @@ impl PlanFollower {
         constant && unasked && self.request.max_rate == 1.0 && self.plan_limit() == 1.0
     }
 
-    /// As much of `delta_s` as lies within what was looked at.
-    fn covered(&self, delta_s: f64) -> f64 {
-        delta_s.min(self.points.covered_s.max(if self.cursor.is_resting() {
-            f64::MAX
-        } else {
-            0.0
-        }))
+    /// As much of `delta_s` as lies within what was looked at. Behind what is queued nothing is known: there the machine stands, and
+    /// from there it gets on as from rest, not at the rate with which it came in. Where the plan itself is at rest any rate is as good.
+    fn covered(&mut self, delta_s: f64) -> f64 {
+        let covered_s = self.points.covered_s;
+        if self.cursor.is_resting() || delta_s <= covered_s {
+            return delta_s;
+        }
+        let ahead = self.cursor.ahead();
+        let mut wall = ahead.place(self.axes);
+        let mut beyond = wall;
+        wall.go(covered_s);
+        beyond.go(delta_s);
+        let moves = wall.pace().is_none_or(|pace| pace.speed > 0.0);
+        if moves && !beyond.is_known() {
+            self.governor.jump(0.0);
+            self.recovering = true;
+        }
+        covered_s
     }
 
     /// The highest rate at which the plan keeps velocity and acceleration. Jerk beyond the limit at single points need not be
