@@ -1,7 +1,8 @@
 //! Progress of program time: where nothing is asked to stop, it gets on, or the machine faults.
 //!
 //! In any window of [`Progress::max_periods`] fine periods in which nothing asks for a stop, the queue is not starved and
-//! something is queued, program time grows by at least one fine period at the least rate that was asked for in the window.
+//! something is queued, program time grows by at least one fine period at the least rate that was asked for in the window, or a
+//! rest further on is reached: blocks of far less than a period that each end at rest take one period each, however short they are.
 //! The window is derived from the machine: from rest an axis is at its highest speed V after `V/A + A/J`. At half the rate
 //! the plan itself takes a quarter of the acceleration and an eighth of the jerk at most, so that what is left brings σ up in
 //! four times that, and by then far more than one period of program time has passed.
@@ -27,6 +28,8 @@ pub(super) struct Progress {
     periods: u64,
     /// Program time when the window began, s.
     from_s: f64,
+    /// Program time after the last period, s.
+    last_s: f64,
     /// Least rate asked for in the window.
     asked: f64,
 }
@@ -53,6 +56,7 @@ impl Progress {
             max_periods,
             periods: 0,
             from_s: 0.0,
+            last_s: 0.0,
             asked: 1.0,
         }
     }
@@ -83,8 +87,11 @@ impl FineLoop {
         let now_s = self.plan.cursor.program_time_s();
         let grown_s = now_s - self.progress.from_s;
         let min_s = self.progress.asked * self.config.period_s;
+        let is_at_next_rest = reached == Reached::Rest && now_s > self.progress.last_s;
+        self.progress.last_s = now_s;
         // What is true nearly always is looked at first.
         if grown_s > min_s
+            || is_at_next_rest
             || ask != Ask::Run
             || self.stands_by_ratio()
             || self.has_nothing_to_do(reached)
