@@ -349,6 +349,13 @@ mod tests {
 
     #[test]
     fn velocity_and_travel_are_kept_to_their_tolerance() {
+        let mut low = guard();
+        low.position[2] = -500.0;
+        let mut at = low.position;
+        at[2] -= FITTED_MM;
+        assert!(low.check(&at, 0).breach.is_none());
+        at[2] -= FITTED_MM;
+        assert!(low.check(&at, 0).breach.is_some());
         let mut up: Vec<f64> = (1..=100).map(f64::from).collect();
         assert_eq!(breach(1, &up), None);
         up.push(100.001);

@@ -174,3 +174,45 @@ impl Horizon {
         (0..self.axes).map(|axis| (axis, (self.acceleration[axis], self.jerk[axis])))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cursor::Cursor;
+    use rtrb::RingBuffer;
+    use tandem_rings::Queued;
+    use tandem_sdk::{AxisVector, SegmentFlags};
+
+    /// 0.15 s along an axis with a jerk of 1000 mm/s³, then along one with 100, at 10 mm/s.
+    #[test]
+    fn only_what_a_stop_passes_limits_its_path_jerk() {
+        let limits = [1000.0, 100.0, 100.0, 100.0, 100.0, 100.0, 100.0, 100.0];
+        let limits = limits.map(|jerk_mm_per_s3| AxisLimits {
+            min_mm: -1000.0,
+            max_mm: 1000.0,
+            feed_mm_per_s: 100.0,
+            rapid_mm_per_s: 100.0,
+            acceleration_mm_per_s2: 100.0,
+            jerk_mm_per_s3,
+            speed_difference_mm_per_s: 0.0,
+        });
+        let (mut input, output) = RingBuffer::new(8);
+        for (axis, duration_s) in [(0, 0.15), (1, 1.0)] {
+            let mut segment = Segment::rest(&AxisVector::ZERO, duration_s);
+            segment.flags = SegmentFlags::default();
+            segment.coefficients[axis][1] = 10.0;
+            segment.path[1] = 10.0;
+            let start_s = 0.0;
+            input.push(Queued::Segment { start_s, segment }).unwrap();
+        }
+        let mut cursor = Cursor::new(output, &AxisVector::ZERO);
+        cursor.advance(1e-9, |_| false);
+        let mut horizon = Horizon::new(&limits, 2, 0.001);
+        horizon.fill(&cursor.ahead(), 0.001);
+        // A stop from there takes 0.2 s: at half the rate 0.1 s of program time pass, which end before the second segment.
+        let near = horizon.path_jerk_to_rest(0.5, 10.0, 0.0);
+        let far = horizon.path_jerk_to_rest(1.0, 10.0, 0.0);
+        assert!((near / far - 10.0).abs() < 1e-9, "{near} and {far} mm/s³");
+        assert_eq!(far, horizon.path_jerk_mm_per_s3);
+    }
+}

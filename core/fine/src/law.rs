@@ -184,11 +184,14 @@ mod tests {
             // Falling so fast that it goes below nothing, to 1.9, and comes back.
             (0.1, -2.0, 2.0 + 2.0 * 1.9f64.sqrt()),
         ] {
-            let found_s = stop_s(rate, change, 2.0, 1.0);
-            assert!(
-                (found_s - expected_s).abs() < 1e-12,
-                "{rate} {change}: {found_s} s"
-            );
+            // The same in a time that passes three times as fast.
+            for faster in [1.0, 3.0] {
+                let found_s = stop_s(rate, faster * change, faster * 2.0, faster * faster);
+                assert!(
+                    (found_s - expected_s / faster).abs() < 1e-12,
+                    "{rate} {change}: {found_s} s, {faster} times as fast"
+                );
+            }
         }
     }
 

@@ -531,6 +531,14 @@ mod tests {
     }
 
     #[test]
+    fn derivatives_are_those_of_the_polynomial() {
+        let c = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
+        assert_eq!(derivatives(&c, 1.0), [70.0, 210.0, 504.0]);
+        assert_eq!(derivatives(&c, 2.0), [702.0, 1254.0, 1704.0]);
+        assert_eq!(derivatives(&c, 0.0), [2.0, 6.0, 24.0]);
+    }
+
+    #[test]
     fn what_is_planned_a_while_ahead_is_that_of_the_piece_there() {
         let mut cursor = cursor(&[1.0, 2.0, 4.0, 8.0]);
         cursor.advance(0.5, |_| false);

@@ -37,6 +37,7 @@ pub struct Bench {
     x_mm: f64,
     epoch: u32,
     stop_on: StopOn,
+    line: u32,
 }
 
 impl Bench {
@@ -112,6 +113,7 @@ impl Bench {
             x_mm: 0.0,
             epoch: 0,
             stop_on: StopOn::default(),
+            line: 1,
         }
     }
 
@@ -204,6 +206,12 @@ impl Bench {
         };
     }
 
+    /// What is queued from here on belongs to the next line; returns where that begins, mm.
+    pub fn next_line(&mut self) -> f64 {
+        self.line += 1;
+        self.x_mm
+    }
+
     /// Queues an event.
     pub fn event(&mut self, kind: EventKind, index: i32, value: f64) {
         let event = Event {
@@ -237,6 +245,7 @@ impl Bench {
             SegmentFlags::default()
         };
         segment.epoch = self.epoch;
+        segment.line = self.line;
         segment.stop_on = self.stop_on;
         segment.feed_mm_per_s = FEED_MM_PER_S;
         segment.stop_deceleration_mm_per_s2 = PLANNED_MM_PER_S2;

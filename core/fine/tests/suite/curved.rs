@@ -6,7 +6,7 @@ use std::sync::atomic::Ordering::Relaxed;
 
 use common::{Bench, PERIOD_S};
 use tandem_rings::{MachineState, Sample};
-use tandem_sdk::{AxisVector, Kinematics};
+use tandem_sdk::{AxisVector, Kinematics, PluginError};
 
 /// Joint 0 is x + x²/1000: it slows down harder than the axis does.
 struct Bent;
@@ -75,4 +75,36 @@ fn the_joint_keeps_its_limit_and_the_place_where_it_rests_is_known() {
         "the axis was to be at {} mm",
         last.command[0]
     );
+}
+
+/// It finds no joints beyond 0.5 mm, and says so.
+struct Lost;
+
+impl Kinematics for Lost {
+    fn to_joints(&self, axes: &AxisVector) -> AxisVector {
+        let mut joints = *axes;
+        if axes[0] > 0.5 {
+            joints[0] = f64::NAN;
+        }
+        joints
+    }
+
+    fn to_axes(&self, joints: &AxisVector) -> AxisVector {
+        *joints
+    }
+
+    fn health(&self) -> Result<(), PluginError> {
+        Err(PluginError::fixed("the elbow is lost"))
+    }
+}
+
+#[test]
+fn kinematics_that_find_no_joints_are_a_fault_with_their_own_words() {
+    let mut bench = Bench::with_curved(Box::new(Lost));
+    bench.accelerate();
+    bench.cruise(1.0);
+    until_fault(&mut bench);
+    assert!(bench.fine.fault().is_some());
+    let said = bench.fine.plugin_error().map(ToString::to_string);
+    assert!(said.is_some_and(|said| said.contains("the elbow is lost")));
 }

@@ -15,6 +15,7 @@ mod progress;
 mod promises;
 mod ratio;
 mod rounds;
+mod single_block;
 #[path = "../smooth/mod.rs"]
 mod smooth;
 mod switched;
