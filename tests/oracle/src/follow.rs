@@ -55,6 +55,18 @@ pub fn follow(path: &Path, commands: &[Position], options: &Options) -> Followed
         return followed;
     };
     followed.end = walker.end(first.last().copied().unwrap_or_default(), &last);
+    // Where a motion to and fro is as short as a period, the first places may lag behind by whole turns of it.
+    if !walker.is_at_end(followed.end)
+        && walker.may_end_at(&last)
+        && let Some(places) = walker.any(&followed.chain)
+    {
+        let end = walker.end(places.last().copied().unwrap_or_default(), &last);
+        if walker.is_at_end(end) {
+            followed.end = end;
+            followed.settle(&path.elements, &places, &places);
+            return followed;
+        }
+    }
     let latest = latest(
         &path.elements,
         followed.end,

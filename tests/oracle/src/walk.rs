@@ -160,6 +160,18 @@ impl<'a> Walker<'a> {
         best
     }
 
+    /// Whether a place is the end of the path.
+    pub fn is_at_end(&self, place: PathPosition) -> bool {
+        place.element + 1 == self.elements.len() && place.fraction >= 1.0
+    }
+
+    /// Whether a sample lies where the path ends.
+    pub fn may_end_at(&self, sample: &Position) -> bool {
+        self.elements.last().is_some_and(|element| {
+            distance(&element.shape.at(1.0), sample) <= self.tolerance_mm(element)
+        })
+    }
+
     fn tolerance_mm(&self, element: &Element) -> f64 {
         self.sample_tolerance_mm
             .unwrap_or(element.tolerance_mm)

@@ -289,6 +289,27 @@ fn reversals_closer_than_a_few_tolerances_are_followed() {
     );
 }
 
+/// The first place of each sample lags by a whole turn wherever a sample may not have turned yet.
+#[test]
+fn motion_to_and_fro_within_a_period_is_followed_to_its_end() {
+    const TURN_MM: f64 = 0.21;
+    let program = format!("F600\n{}M2\n", "G1 X0.21\nX0\n".repeat(13) + "X0.21\n");
+    let exact = Options {
+        checks: vec![Check::Path],
+        sample_tolerance_mm: Some(1e-6),
+        vertex_tolerance_mm: Some(0.14),
+        ..Options::default()
+    };
+    let judged = |turns: f64| {
+        let way = |sample: u32| (0.278 * f64::from(sample)).min(turns * TURN_MM);
+        let place = |way_mm: f64| TURN_MM - (way_mm % (2.0 * TURN_MM) - TURN_MM).abs();
+        let samples: Vec<Position> = (0..32).map(|n| at(place(way(n)), 0.0, 0.0)).collect();
+        judge(&trace(&samples), &program, &smooth_machine(), &exact)
+    };
+    assert_passes(&judged(27.0));
+    assert_finds(&judged(26.5), &[Kind::NotCovered]);
+}
+
 #[test]
 fn stopping_and_going_back_a_little_is_off_the_order_of_travel() {
     let back = [
