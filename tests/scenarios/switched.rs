@@ -26,7 +26,7 @@ fn events(done: &Done) -> Vec<(u64, u32, String, f64, String)> {
             tick,
             row[2].parse().unwrap(),
             row[3].to_string(),
-            row[4].parse::<f64>().unwrap().round(),
+            row[4].parse().unwrap(),
             row[5].to_string(),
         )
     };

@@ -9,7 +9,7 @@ use tandem_rings::{FLOOD, MIST, Sample, StopCause, Switched, SwitchedBy};
 use tandem_sdk::{Event, EventKind};
 
 use super::output::{Output, RecordError};
-use super::trace_csv::{TraceCsv, rpm};
+use super::trace_csv::{RoundIfClose, TraceCsv, rpm};
 
 /// Writes an events CSV: a row for each switch of spindle, coolant and outputs.
 pub struct EventsCsv {
@@ -301,7 +301,7 @@ impl EventsCsv {
         let (word, shown) = (
             what.shown(),
             if what == What::Spindle {
-                rpm(value)
+                rpm(value).round_if_close()
             } else {
                 value
             },

@@ -208,7 +208,7 @@ fn number(value: f64) -> String {
     }
 }
 
-trait RoundIfClose {
+pub(super) trait RoundIfClose {
     /// The nearest whole number where it is within rounding, else the number itself.
     fn round_if_close(self) -> f64;
 }
@@ -216,7 +216,7 @@ trait RoundIfClose {
 impl RoundIfClose for f64 {
     fn round_if_close(self) -> f64 {
         let whole = self.round();
-        if (self - whole).abs() <= 1e-9 * whole {
+        if (self - whole).abs() <= 1e-9 * whole.abs() {
             whole
         } else {
             self
