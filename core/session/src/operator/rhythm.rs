@@ -41,7 +41,8 @@ impl Rhythm {
         };
         let sooner = std::mem::take(&mut self.sooner);
         let missed = late.div_duration_f64(self.every).floor();
-        self.due += self.every.mul_f64(missed + 1.0) - sooner;
+        let ahead = self.every.mul_f64(missed + 1.0);
+        self.due += ahead.saturating_sub(sooner);
         true
     }
 }
