@@ -326,4 +326,76 @@ mod tests {
             .contains("plane")
         );
     }
+
+    #[test]
+    fn a_block_is_refused_for_what_it_lacks() {
+        let axes = Axes::new(&[('X', false), ('Y', false)]).unwrap();
+        let arc = |plane| {
+            let mut arc = Block {
+                kind: BlockKind::Arc,
+                length_mm: 1.0,
+                feed_mm_per_s: 10.0,
+                ..Block::at(AxisVector::ZERO)
+            };
+            arc.arc.plane = plane;
+            arc
+        };
+        assert!(check(&arc([0, 1]), &axes).is_ok());
+        let said = check(&arc([0, 2]), &axes).unwrap_err().to_string();
+        assert!(said.contains("axes that the machine lacks"), "{said}");
+        let mut long = arc([0, 1]);
+        long.length_mm = f64::INFINITY;
+        assert!(check(&long, &axes).is_err());
+        let mut still = arc([0, 1]);
+        still.feed_cap_mm_per_s = 0.0;
+        assert!(check(&still, &axes).is_err());
+        still.kind = BlockKind::Dwell;
+        assert!(check(&still, &axes).is_ok());
+        still.dwell_s = -1.0;
+        assert!(check(&still, &axes).is_err());
+    }
+
+    #[test]
+    fn a_cap_limits_a_block_only_where_it_is_below_the_feed() {
+        for (cap, by) in [
+            (9.0, LimitedBy::Policy),
+            (10.0, LimitedBy::Feed),
+            (11.0, LimitedBy::Feed),
+        ] {
+            let block = Block {
+                feed_mm_per_s: 10.0,
+                feed_cap_mm_per_s: cap,
+                ..Block::at(AxisVector::ZERO)
+            };
+            assert_eq!(limited_by_feed(&block), by, "{cap} mm/s");
+        }
+    }
+
+    #[test]
+    fn a_writer_that_is_reset_forgets_its_dwell() {
+        let mut writer = BlockWriter::new(3);
+        let mut kept = Kept::default();
+        let block = BlockId { index: 7, line: 9 };
+        writer.begin_dwell(block, &AxisVector::ZERO, 1.0, 0.0, &mut kept);
+        assert!(writer.is_dwelling());
+        writer.reset();
+        assert!(!writer.is_dwelling() && writer.emit_dwell(1.0, &mut kept).is_none());
+    }
+
+    #[test]
+    fn the_blank_of_a_rapid_is_rapid_and_that_of_a_line_has_its_feed() {
+        for (kind, rapid, feed) in [
+            (BlockKind::Rapid, true, f64::INFINITY),
+            (BlockKind::Line, false, 10.0),
+        ] {
+            let block = Block {
+                kind,
+                feed_mm_per_s: 10.0,
+                ..Block::at(AxisVector::ZERO)
+            };
+            let blank = BlockWriter::new(3).blank(&block);
+            assert_eq!(blank.flags.contains(SegmentFlags::RAPID), rapid);
+            assert_eq!(blank.feed_mm_per_s, feed);
+        }
+    }
 }
