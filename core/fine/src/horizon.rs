@@ -1,7 +1,7 @@
 //! Where the plan goes in the coming period and for a while after it, for segments that keep a jerk limit.
 
 use crate::governor::tuning::{
-    APPROACH_JERK_SHARE, MAX_RATE_CHANGE, STRAIGHT_ON_JERK_SHARE, STRAIGHT_ON_SHARE,
+    APPROACH_JERK_SHARE, HURRY_FACTOR, MAX_RATE_CHANGE, STRAIGHT_ON_JERK_SHARE, STRAIGHT_ON_SHARE,
 };
 use tandem_sdk::{AxisLimits, MAX_AXES, Segment};
 
@@ -27,6 +27,8 @@ pub struct Horizon {
     axes: usize,
     acceleration: [f64; MAX_AXES],
     jerk: [f64; MAX_AXES],
+    /// The queue runs dry.
+    is_hurried: bool,
     /// How far the grid reaches, s of program time.
     pub reach_s: f64,
     /// Least path jerk that the limits leave on a straight path, over the points, mm/s³.
@@ -52,6 +54,7 @@ impl Horizon {
         Self {
             list: vec![HorizonPoint::default(); Self::POINTS].into_boxed_slice(),
             count: 0,
+            is_hurried: false,
             axes,
             acceleration: limits.map(|l| l.acceleration_mm_per_s2),
             jerk: limits.map(|l| l.jerk_mm_per_s3),
@@ -91,10 +94,24 @@ impl Horizon {
 
     /// Forgets all points.
     fn clear(&mut self) {
-        self.count = 0;
+        (self.count, self.is_hurried) = (0, false);
         (self.path_jerk_mm_per_s3, self.rate_change_per_s2) =
             (f64::INFINITY, self.max_change_per_s2);
         self.approach_jerk_share = STRAIGHT_ON_JERK_SHARE;
+    }
+
+    /// The queue runs dry: σ is lowered in larger steps than where there is time, within what the limits leave.
+    pub fn hurry(&mut self) {
+        self.is_hurried = true;
+    }
+
+    /// Bound on σ̈ that the period sets now, 1/s².
+    pub fn small_change_per_s2(&self) -> f64 {
+        if self.is_hurried {
+            HURRY_FACTOR * self.max_change_per_s2
+        } else {
+            self.max_change_per_s2
+        }
     }
 
     /// Whether the points of a period have taken what room there is beside the grid.

@@ -226,7 +226,7 @@ impl Governor {
         let (sigma, rate) = (self.sigma, self.rate_per_s);
         let along = sigma * sigma * acceleration + speed * rate;
         let path_jerk = horizon.path_jerk_to_rest(sigma, sigma * speed, along);
-        let path_jerk = ORDER3_LIMIT_SHARE * path_jerk.min(speed * horizon.max_change_per_s2);
+        let path_jerk = ORDER3_LIMIT_SHARE * path_jerk.min(speed * horizon.small_change_per_s2());
         if aim.speed_mm_per_s.is_infinite() || speed <= 0.0 || !path_jerk.is_finite() {
             return free;
         }
@@ -286,7 +286,7 @@ impl Governor {
 
     /// `wanted` in small steps, which the limits do not ask for where next to nothing moves; larger ones to end an approach.
     pub(super) fn small(&self, wanted: f64, horizon: &Horizon) -> f64 {
-        let small = horizon.max_change_per_s2;
+        let small = horizon.small_change_per_s2();
         let (down, up) = if self.rate_per_s < 0.0 {
             (small, APPROACH_END_FACTOR * small)
         } else {

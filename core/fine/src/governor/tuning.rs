@@ -70,6 +70,10 @@ pub const APPROACH_END_FACTOR: f64 = 4.0;
 /// next to nothing moves and the limits would allow more.
 pub const MAX_RATE_CHANGE: f64 = 0.02;
 
+/// Order 3: how many times as large the steps may be where the queue runs dry: in steps of the size before a stop takes 14 periods,
+/// and what is queued may be over before.
+pub const HURRY_FACTOR: f64 = 8.0;
+
 /// Order 3: below this share of the limits a plan goes straight on at constant speed.
 pub const STRAIGHT_ON_SHARE: f64 = 1e-3;
 

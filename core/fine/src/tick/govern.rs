@@ -201,6 +201,9 @@ impl PlanFollower {
                 return self.covered(self.period_s);
             }
             self.horizon.fill(&self.cursor.ahead(), self.period_s);
+            if ask == Ask::Starve {
+                self.horizon.hurry();
+            }
         } else if ask == Ask::Run && below {
             let longer = self.longer();
             ratios.feed /= longer;
