@@ -32,10 +32,10 @@ const MIN_RATE_SQUARED: f64 = 0.01;
 /// Groups of rows of an interval: jerk at three places, acceleration at its start.
 const RETIMED: usize = 4;
 /// Mean complementarity asked of the last round, and of those before.
-const GAP: f64 = 1e-5;
+const GAP: f64 = 2e-5;
 const LOOSE: f64 = 3e-3;
 /// Gain of a round, as a share of the time, that is worth another.
-const GAIN: f64 = 2e-3;
+const GAIN: f64 = 4e-3;
 
 /// What can be tuned.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -339,7 +339,7 @@ impl<const L: usize> Planning<L> {
         let smoothed = self
             .smoother
             .smooth(&mut self.spline, &self.waypoints.chosen, &frame.jerk);
-        self.fill_retimer(run, frame, shares, counted);
+        self.fill_retimer(run, frame, shares, counted, &rests);
         let asked = if last {
             Asked {
                 gap: GAP,
@@ -399,6 +399,7 @@ impl<const L: usize> Planning<L> {
         frame: &Frame<L>,
         shares: &Shares,
         counted: &Lanes<L>,
+        rests: &[bool; L],
     ) {
         let speed = &frame.speed[usize::from(run.rapid)];
         let per_speed: Lanes<L> = speed.map(|v| 1.0 / (0.9995 * v));
@@ -432,7 +433,8 @@ impl<const L: usize> Planning<L> {
                 ..Point::default()
             }
         };
-        self.retimer.begin(self.spline.step_s);
+        let moving = std::array::from_fn(|l| l < frame.count && !rests[l]);
+        self.retimer.begin(self.spline.step_s, &moving);
         let mut ends = self.spline.at(0, 0.0);
         for k in 0..self.spline.intervals() {
             let feed = feeds.of(k);

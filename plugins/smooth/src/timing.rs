@@ -128,7 +128,7 @@ impl Timing {
         for i in (1..last).rev() {
             let next = self.nodes[i + 1];
             let node = &mut self.nodes[i];
-            node.speed = node.speed.min(gain(&next, next.s - node.s));
+            node.speed = reached(&next, node.speed, next.s - node.s);
         }
         let mut t = marks.last().map_or(0.0, |mark| mark.t);
         for pair in self.nodes.windows(2) {
@@ -177,6 +177,8 @@ impl Timing {
         let mut s = reach.s;
         let mut t = 0.0;
         let mut last_cap = f64::INFINITY;
+        // How long a corner takes, and what that follows from.
+        let mut last_corner = (f64::NAN, 0.0);
         // Where the next sharp turn before and the last one behind are.
         let mut ahead = looker.at;
         let mut grown = 0.25;
@@ -186,7 +188,11 @@ impl Timing {
             let speed = feed(chord, counted).min(along(&limits, &chord.direction));
             let jerk = along(&frame.jerk, &chord.direction);
             let tolerance = chord.tolerance;
-            let corner_s = (6.0 * tolerance / frame.jerk[0].min(jerk)).cbrt();
+            let corner = tolerance / frame.jerk[0].min(jerk);
+            if corner != last_corner.0 {
+                last_corner = (corner, (6.0 * corner).cbrt());
+            }
+            let corner_s = last_corner.1;
             let most = speed.min(last_cap / (SLOWER * SLOWER * SLOWER * SLOWER));
             let cap = cap(&looker, frame, s, most, corner_s);
             last_cap = cap;
@@ -199,7 +205,7 @@ impl Timing {
             };
             if let Some(before) = self.nodes.last() {
                 let way = s - before.s;
-                node.speed = cap.min(gain(before, way));
+                node.speed = reached(before, cap, way);
                 t += 2.0 * way / (before.speed + node.speed);
             } else {
                 node.speed = reach.speed;
@@ -277,7 +283,16 @@ pub fn feed<const L: usize>(chord: &Chord<L>, counted: &Lanes<L>) -> f64 {
     }
 }
 
-/// The speed reached from a node over `way`: the exact jerk ramp from rest, and 0.8 of the acceleration.
+/// The speed reached from a node over `way`, at most `cap`. Most nodes are passed at one speed: it is known to be reached.
+fn reached(from: &Node, cap: f64, way: f64) -> f64 {
+    if cap <= from.speed {
+        cap
+    } else {
+        cap.min(gain(from, way))
+    }
+}
+
+/// The speed gained from a node over `way`: the exact jerk ramp from rest, and 0.8 of the acceleration.
 fn gain(from: &Node, way: f64) -> f64 {
     let v = from.speed;
     let ramp = v * v.sqrt() + 3.0 * (from.jerk / 2.0).sqrt() * way;

@@ -105,7 +105,7 @@ fn solve<const L: usize>(
         per_acceleration: each(|l| per(&limits.acceleration_mm_per_s2, l)),
         per_jerk: each(|l| per(&limits.jerk_mm_per_s3, l)),
     };
-    retimer.begin(task.step_s);
+    retimer.begin(task.step_s, &std::array::from_fn(|l| l < task.limits.count));
     for points in task.points {
         retimer.push(&points.each_ref().map(narrow), &factors);
     }

@@ -1,7 +1,7 @@
 //! The interior point method.
 
 use super::banded::Pentadiagonal;
-use super::share::{Form, MAX_SINGLES, Rows, Share, Sides};
+use super::share::{Form, Rows, Share, Sides, WIDE, Wide, dot};
 use super::timing::{Rate, weights};
 use super::{End, GRID, PLACES, Point};
 use crate::lanes::{Lanes, each, larger, largest, smaller};
@@ -66,16 +66,30 @@ pub struct Factors<const L: usize> {
     pub per_jerk: Lanes<L>,
 }
 
-/// Three places of an interval: the rows there.
+/// Three places each of as many intervals as there are lanes, side by side: the rows there.
 #[derive(Clone, Copy, Debug)]
-struct Site<const L: usize, const GROUPS: usize> {
-    interval: usize,
-    /// The time of the interval counts here: once for each.
-    timed: bool,
+struct Sites<const L: usize, const GROUPS: usize> {
+    /// How many there are. Behind the last of all it stands again, and is not counted twice in what is sought.
+    count: usize,
+    interval: [usize; WIDE],
+    /// 1 where the time of the interval counts here: once for each.
+    timed: Wide,
     /// Weights of b at each place.
-    values: [[f64; 3]; PLACES],
-    forms: [Form<L>; GROUPS],
-    most: [f64; PLACES],
+    values: [[Wide; 3]; PLACES],
+    /// Of every axis.
+    forms: [[Form; GROUPS]; L],
+    most: [Wide; PLACES],
+}
+
+impl<const L: usize, const GROUPS: usize> Sites<L, GROUPS> {
+    const NONE: Self = Self {
+        count: 0,
+        interval: [0; WIDE],
+        timed: [0.0; WIDE],
+        values: [[[0.0; WIDE]; 3]; PLACES],
+        forms: [[[[0.0; WIDE]; 3]; GROUPS]; L],
+        most: [[0.0; WIDE]; PLACES],
+    };
 }
 
 /// Solves retimings of up to `L` axes; keeps its memory from one to the next.
@@ -84,12 +98,19 @@ struct Site<const L: usize, const GROUPS: usize> {
 /// at the first one (4 groups) or two (5 groups). The rate is bounded from above at as many places and one more.
 #[derive(Debug)]
 pub struct Retimer<const L: usize, const GROUPS: usize> {
-    sites: Vec<Site<L, GROUPS>>,
+    sites: Vec<Sites<L, GROUPS>>,
+    /// How many sites were pushed.
+    count: usize,
     intervals: usize,
     step_s: f64,
+    /// The axes that move: the rows of others are kept whatever the rate is.
+    moving: [usize; L],
+    moving_count: usize,
     rows: Vec<Rows<L, GROUPS>>,
     matrix: Pentadiagonal,
     step: Vec<f64>,
+    /// The change of each coefficient.
+    change: Vec<f64>,
     /// Which unknown a coefficient is; negative for one that is fixed.
     unknown: Vec<i32>,
     unknowns: usize,
@@ -104,11 +125,15 @@ impl<const L: usize, const GROUPS: usize> Default for Retimer<L, GROUPS> {
     fn default() -> Self {
         Self {
             sites: Vec::new(),
+            count: 0,
             intervals: 0,
             step_s: 0.0,
+            moving: [0; L],
+            moving_count: 0,
             rows: Vec::new(),
             matrix: Pentadiagonal::default(),
             step: Vec::new(),
+            change: Vec::new(),
             unknown: Vec::new(),
             unknowns: 0,
             gap: 0.0,
@@ -118,42 +143,49 @@ impl<const L: usize, const GROUPS: usize> Default for Retimer<L, GROUPS> {
     }
 }
 
-#[inline(always)]
-fn dot(w: &[f64; 3], beta: &[f64; 3]) -> f64 {
-    w[0] * beta[0] + w[1] * beta[1] + w[2] * beta[2]
-}
-
 /// The rows `weight·b ± form·β ≤ right` at a place where b is `w·β`: the right side of the jerk, `b^(−1/2)`, is convex, its
 /// tangent `3/2·b₀^(−1/2) − 1/2·b₀^(−3/2)·b` lies below.
 #[inline(always)]
-fn sides(w: &[f64; 3], beta: &[f64; 3], min_rate_squared: f64) -> Sides {
-    let b = larger(dot(w, beta), min_rate_squared);
-    let inverse = 1.0 / b.sqrt();
-    let weight = 0.5 * inverse / b;
+fn sides(w: &[Wide; 3], beta: &[Wide; 3], min_rate_squared: f64) -> Sides {
+    let b = dot(w, beta);
+    let b: Wide = each(|i| larger(b[i], min_rate_squared));
+    let inverse: Wide = each(|i| 1.0 / b[i].sqrt());
+    let weight: Wide = each(|i| 0.5 * inverse[i] / b[i]);
     Sides {
-        w: *w,
         weight,
-        common: weight * b,
-        right: 1.5 * inverse,
+        common: each(|i| weight[i] * b[i]),
+        right: each(|i| 1.5 * inverse[i]),
     }
 }
 
-/// The same without a part in b: acceleration is linear in it.
-fn steady(place: &Sides) -> Sides {
-    Sides {
-        weight: 0.0,
-        common: 0.0,
-        right: 1.0,
-        ..*place
-    }
-}
-
-/// The coefficients that count in an interval.
+/// The places of sites at the present rate.
 #[inline(always)]
-fn beta(rate: &Rate, interval: usize) -> [f64; 3] {
-    *rate.coefficients[interval..]
-        .first_chunk()
-        .expect("three coefficients")
+fn places<const L: usize, const GROUPS: usize>(
+    sites: &Sites<L, GROUPS>,
+    beta: &[Wide; 3],
+    min_rate_squared: f64,
+) -> [Sides; PLACES] {
+    let [a, b, c] = &sites.values;
+    [
+        sides(a, beta, min_rate_squared),
+        sides(b, beta, min_rate_squared),
+        sides(c, beta, min_rate_squared),
+    ]
+}
+
+/// The coefficients that count in each interval.
+#[inline(always)]
+fn beta(coefficients: &[f64], interval: &[usize; WIDE]) -> [Wide; 3] {
+    let mut beta = [[0.0; WIDE]; 3];
+    for (i, k) in interval.iter().enumerate() {
+        let c: &[f64; 3] = coefficients[*k..]
+            .first_chunk()
+            .expect("three coefficients");
+        for n in 0..3 {
+            beta[n][i] = c[n];
+        }
+    }
+    beta
 }
 
 impl<const L: usize, const GROUPS: usize> Retimer<L, GROUPS> {
@@ -162,11 +194,17 @@ impl<const L: usize, const GROUPS: usize> Retimer<L, GROUPS> {
     /// Places at which b is bounded from above; the single row after these bounds it from below.
     const BOUNDS: usize = Self::ACCELERATIONS + 1;
 
-    /// Begins a grid with intervals of `step_s`. Then [`Retimer::push`] every interval, and [`Retimer::solve`].
-    pub fn begin(&mut self, step_s: f64) {
-        self.sites.clear();
+    /// Begins a grid with intervals of `step_s` for a motion of the axes that are `moving`. Then [`Retimer::push`] every interval,
+    /// and [`Retimer::solve`].
+    pub fn begin(&mut self, step_s: f64, moving: &[bool; L]) {
+        self.count = 0;
         self.intervals = 0;
         self.step_s = step_s;
+        self.moving_count = 0;
+        for l in (0..L).filter(|l| moving[*l]) {
+            self.moving[self.moving_count] = l;
+            self.moving_count += 1;
+        }
     }
 
     /// The next interval: the motion at its start, in its middle and at its end.
@@ -196,41 +234,72 @@ impl<const L: usize, const GROUPS: usize> Retimer<L, GROUPS> {
     ) {
         let r1 = 1.0 / self.step_s;
         let r2 = 1.0 / (self.step_s * self.step_s);
-        let mut forms = [[[0.0; L]; 3]; GROUPS];
+        let at = self.count % WIDE;
+        if self.count / WIDE == self.sites.len() {
+            self.sites.push(Sites::NONE);
+            self.rows.push(Rows::NONE);
+        }
+        let sites = &mut self.sites[self.count / WIDE];
+        sites.count = at + 1;
+        self.count += 1;
+        sites.interval[at] = interval;
+        sites.timed[at] = if timed { 1.0 } else { 0.0 };
         for n in 0..PLACES {
             let point = &points[n];
             let [value, slope, curve] = weights(z[n]);
+            sites.most[n][at] = smaller(point.most, MAX_RATE_SQUARED);
+            for i in 0..3 {
+                sites.values[n][i][at] = value[i];
+            }
             let per_share = 1.0 / point.jerk_share;
-            let per_jerk: Lanes<L> = each(|l| factors.per_jerk[l] * per_share);
-            for i in 0..3 {
-                let w0 = value[i];
-                let w1 = 1.5 * r1 * slope[i];
-                let w2 = 0.5 * r2 * curve[i];
-                forms[n][i] = each(|l| {
-                    per_jerk[l] * (point.third[l] * w0 + point.second[l] * w1 + point.first[l] * w2)
-                });
+            for l in &self.moving[..self.moving_count] {
+                let per_jerk = factors.per_jerk[*l] * per_share;
+                let [third, second, first] = [
+                    per_jerk * point.third[*l],
+                    per_jerk * (1.5 * r1) * point.second[*l],
+                    per_jerk * (0.5 * r2) * point.first[*l],
+                ];
+                for i in 0..3 {
+                    sites.forms[*l][n][i][at] =
+                        third * value[i] + second * slope[i] + first * curve[i];
+                }
             }
-        }
-        for n in 0..Self::ACCELERATIONS {
-            let point = &points[n];
-            let [value, slope, _] = weights(z[n]);
+            if n >= Self::ACCELERATIONS {
+                continue;
+            }
             let per_share = 1.0 / point.acceleration_share;
-            let per_acceleration: Lanes<L> = each(|l| factors.per_acceleration[l] * per_share);
-            for i in 0..3 {
-                let w0 = value[i];
-                let w1 = 0.5 * r1 * slope[i];
-                forms[PLACES + n][i] =
-                    each(|l| per_acceleration[l] * (point.second[l] * w0 + point.first[l] * w1));
+            for l in &self.moving[..self.moving_count] {
+                let per_acceleration = factors.per_acceleration[*l] * per_share;
+                let second = per_acceleration * point.second[*l];
+                let first = per_acceleration * (0.5 * r1) * point.first[*l];
+                for i in 0..3 {
+                    sites.forms[*l][PLACES + n][i][at] = second * value[i] + first * slope[i];
+                }
             }
         }
-        self.sites.push(Site {
-            interval,
-            timed,
-            values: [weights(z[0])[0], weights(z[1])[0], weights(z[2])[0]],
-            forms,
-            most: [points[0].most, points[1].most, points[2].most]
-                .map(|most| smaller(most, MAX_RATE_SQUARED)),
-        });
+    }
+
+    /// Fills the lanes behind the last site with that.
+    fn fill_up(&mut self) {
+        self.sites.truncate(self.count.div_ceil(WIDE));
+        self.rows.truncate(self.sites.len());
+        let Some(sites) = self.sites.last_mut() else {
+            return;
+        };
+        let last = sites.count - 1;
+        for at in sites.count..WIDE {
+            sites.interval[at] = sites.interval[last];
+            sites.timed[at] = sites.timed[last];
+            for n in 0..PLACES {
+                sites.most[n][at] = sites.most[n][last];
+                for i in 0..3 {
+                    sites.values[n][i][at] = sites.values[n][i][last];
+                }
+            }
+            for form in sites.forms.as_flattened_mut().as_flattened_mut() {
+                form[at] = form[last];
+            }
+        }
     }
 
     /// Finds the rate. Rough loop; allocates where the grid is larger than any before.
@@ -265,6 +334,7 @@ impl<const L: usize, const GROUPS: usize> Retimer<L, GROUPS> {
     #[inline(always)]
     fn solve_any(&mut self, start: Start, ends: (End, End), asked: &Asked) -> Status {
         self.name_unknowns(ends);
+        self.fill_up();
         self.start(start);
         let mut status = Status {
             iterations: 0,
@@ -314,61 +384,42 @@ impl<const L: usize, const GROUPS: usize> Retimer<L, GROUPS> {
     /// Slacks and multipliers for the present rate.
     #[inline(always)]
     fn start(&mut self, start: Start) {
-        self.rows.clear();
-        for site in &self.sites {
-            let beta = beta(&self.rate, site.interval);
-            let places = self.places(site, &beta);
-            let mut slack = [[[0.0; L]; 2]; GROUPS];
-            let mut multiplier = [[[0.0; L]; 2]; GROUPS];
-            for group in 0..GROUPS {
-                let form = &site.forms[group];
-                let room = places
-                    .get(group)
-                    .map_or(1.0, |place| place.right - place.common);
-                for (n, sign) in [1.0, -1.0].into_iter().enumerate() {
-                    slack[group][n] = each(|l| {
-                        let value =
-                            form[0][l] * beta[0] + form[1][l] * beta[1] + form[2][l] * beta[2];
-                        larger(room - sign * value, start.slack)
-                    });
-                    multiplier[group][n] = each(|l| start.product / slack[group][n][l]);
+        for (sites, rows) in self.sites.iter().zip(&mut self.rows) {
+            let beta = beta(&self.rate.coefficients, &sites.interval);
+            let places = places(sites, &beta, self.min_rate_squared);
+            for l in &self.moving[..self.moving_count] {
+                for group in 0..GROUPS {
+                    let value = dot(&sites.forms[*l][group], &beta);
+                    let room = match places.get(group) {
+                        Some(place) => each(|i| place.right[i] - place.common[i]),
+                        None => [1.0; WIDE],
+                    };
+                    let pair = &mut rows.pairs[*l][group];
+                    for (n, sign) in [1.0, -1.0].into_iter().enumerate() {
+                        pair.slack[n] = each(|i| larger(room[i] - sign * value[i], start.slack));
+                        pair.multiplier[n] = each(|i| start.product / pair.slack[n][i]);
+                    }
                 }
             }
-            let mut single_slack = [start.slack; MAX_SINGLES];
-            for n in 0..Self::BOUNDS {
-                single_slack[n] = larger(site.most[n] - dot(&site.values[n], &beta), start.slack);
+            for n in 0..=Self::BOUNDS {
+                let room: Wide = if n < Self::BOUNDS {
+                    let b = dot(&sites.values[n], &beta);
+                    each(|i| sites.most[n][i] - b[i])
+                } else {
+                    let b = dot(&sites.values[1], &beta);
+                    each(|i| b[i] - self.min_rate_squared)
+                };
+                let single = &mut rows.singles[n];
+                single.slack = each(|i| larger(room[i], start.slack));
+                single.multiplier = each(|i| start.product / single.slack[i]);
             }
-            let above = dot(&site.values[1], &beta) - self.min_rate_squared;
-            single_slack[Self::BOUNDS] = larger(above, start.slack);
-            self.rows.push(Rows {
-                slack,
-                multiplier,
-                residual: [[[0.0; L]; 2]; GROUPS],
-                inverse: [[[0.0; L]; 2]; GROUPS],
-                weight: [0.0; GROUPS],
-                single_slack,
-                single_multiplier: single_slack.map(|s| start.product / s),
-                single_residual: [0.0; MAX_SINGLES],
-            });
         }
     }
 
-    /// The places of a site at the present rate.
     #[inline(always)]
-    fn places(&self, site: &Site<L, GROUPS>, beta: &[f64; 3]) -> [Sides; PLACES] {
-        let [a, b, c] = &site.values;
-        let least = self.min_rate_squared;
-        [
-            sides(a, beta, least),
-            sides(b, beta, least),
-            sides(c, beta, least),
-        ]
-    }
-
-    #[inline(always)]
-    fn mean(&self, pairs: &Lanes<L>, singles: f64) -> f64 {
-        (pairs.iter().sum::<f64>() + singles)
-            / (self.rows.len() * (2 * GROUPS * L + Self::BOUNDS + 1)) as f64
+    fn mean(&self, products: &Wide) -> f64 {
+        let pairs = 2 * GROUPS * self.moving_count;
+        products.iter().sum::<f64>() / (WIDE * self.rows.len() * (pairs + Self::BOUNDS + 1)) as f64
     }
 
     /// The Newton system with `f = Σ b^(−1/2)` in the middles; gives the largest violation.
@@ -377,44 +428,71 @@ impl<const L: usize, const GROUPS: usize> Retimer<L, GROUPS> {
         self.matrix.clear(self.unknowns);
         self.step.clear();
         self.step.resize(self.unknowns, 0.0);
-        let mut violation = [0.0; L];
+        let mut violation = [0.0; WIDE];
         for k in 0..self.sites.len() {
-            let site = &self.sites[k];
-            let beta = beta(&self.rate, site.interval);
-            let places = self.places(site, &beta);
+            let sites = &self.sites[k];
+            let beta = beta(&self.rate.coefficients, &sites.interval);
+            let places = places(sites, &beta, self.min_rate_squared);
             let rows = &mut self.rows[k];
-            let mut share = Share::<L>::default();
+            let mut share = Share {
+                violation,
+                ..Share::default()
+            };
             for (group, place) in places.iter().enumerate() {
-                share.pair(&site.forms[group], &beta, place, rows, group, target);
+                rows.weight[group] = place.weight;
+                let w = &sites.values[group];
+                let common = [0, 1, 2].map(|n| each(|i| w[n][i] * place.weight[i]));
+                for l in &self.moving[..self.moving_count] {
+                    let form = &sites.forms[*l][group];
+                    share.jerk(
+                        form,
+                        &beta,
+                        (place, &common),
+                        &mut rows.pairs[*l][group],
+                        target,
+                    );
+                }
             }
-            for n in 0..Self::ACCELERATIONS {
-                let group = PLACES + n;
-                let place = steady(&places[n]);
-                share.pair(&site.forms[group], &beta, &place, rows, group, target);
+            for group in PLACES..GROUPS {
+                for l in &self.moving[..self.moving_count] {
+                    let form = &sites.forms[*l][group];
+                    share.acceleration(form, &beta, &mut rows.pairs[*l][group], target);
+                }
             }
-            for (n, place) in places.iter().take(Self::BOUNDS).enumerate() {
-                let over = dot(&place.w, &beta) - site.most[n];
-                share.single(&place.w, 1.0, over, rows, n, target);
+            for n in 0..Self::BOUNDS {
+                let w = &sites.values[n];
+                let b = dot(w, &beta);
+                let over = each(|i| b[i] - sites.most[n][i]);
+                share.single(w, 1.0, &over, &mut rows.singles[n], target);
             }
-            let middle = &places[1].w;
-            let under = self.min_rate_squared - dot(middle, &beta);
-            share.single(middle, -1.0, under, rows, Self::BOUNDS, target);
-            if site.timed {
-                let b = larger(dot(middle, &beta), self.min_rate_squared);
-                let slope = -0.5 / (b * b.sqrt());
-                share.add(middle, -1.5 * slope / b, slope);
+            let middle = &sites.values[1];
+            let b = dot(middle, &beta);
+            let under = each(|i| self.min_rate_squared - b[i]);
+            share.single(
+                middle,
+                -1.0,
+                &under,
+                &mut rows.singles[Self::BOUNDS],
+                target,
+            );
+            // The weight of the tangent is that of the time's slope.
+            let slope: Wide = each(|i| -sites.timed[i] * places[1].weight[i]);
+            let bend = each(|i| -1.5 * slope[i] / larger(b[i], self.min_rate_squared));
+            share.add(middle, &bend, &slope);
+            violation = share.violation;
+            let (interval, count) = (sites.interval, sites.count);
+            for at in 0..count {
+                self.scatter(interval[at], &share, at);
             }
-            let interval = site.interval;
-            violation = each(|l| larger(violation[l], share.violation[l]));
-            self.scatter(interval, &share);
         }
         largest(&violation)
     }
 
     #[inline(always)]
-    fn scatter(&mut self, k: usize, share: &Share<L>) {
+    fn scatter(&mut self, k: usize, share: &Share, at: usize) {
         const AT: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
-        let (hessian, gradient) = share.sums();
+        let hessian = share.hessian.map(|entry| entry[at]);
+        let gradient = share.gradient.map(|entry| entry[at]);
         let unknown: [i32; 3] = *self.unknown[k..].first_chunk().expect("three coefficients");
         if unknown[0] >= 0 && unknown[1] == unknown[0] + 1 && unknown[2] == unknown[1] + 1 {
             let first = unknown[0] as usize;
@@ -447,44 +525,44 @@ impl<const L: usize, const GROUPS: usize> Retimer<L, GROUPS> {
     #[inline(always)]
     fn advance(&mut self, target: f64) -> f64 {
         let (length, back) = self.turn_into_changes(target);
-        let mut pairs = [0.0; L];
-        let mut singles = 0.0;
+        let mut products = [0.0; WIDE];
         for rows in &mut self.rows {
-            for group in 0..GROUPS {
-                for n in 0..2 {
-                    let change = rows.residual[group][n];
-                    let slack = rows.slack[group][n];
-                    let multiplier = rows.multiplier[group][n];
-                    rows.slack[group][n] = each(|l| slack[l] + length * change[l]);
-                    let inverse = &rows.inverse[group][n];
-                    // Δλ = (target − λ·(s + Δs))/s.
-                    rows.multiplier[group][n] = each(|l| {
-                        let per_slack = multiplier[l] * inverse[l];
-                        multiplier[l]
-                            + back * (target - multiplier[l] * (slack[l] + change[l])) * per_slack
-                    });
-                    let slack = &rows.slack[group][n];
-                    let multiplier = &rows.multiplier[group][n];
-                    pairs = each(|l| pairs[l] + slack[l] * multiplier[l]);
+            for l in &self.moving[..self.moving_count] {
+                for pair in &mut rows.pairs[*l] {
+                    for n in 0..2 {
+                        let (slack, multiplier, change) =
+                            (pair.slack[n], pair.multiplier[n], pair.residual[n]);
+                        let inverse = &pair.inverse[n];
+                        let new_slack: Wide = each(|i| slack[i] + length * change[i]);
+                        // Δλ = (target − λ·(s + Δs))/s.
+                        let new_multiplier: Wide = each(|i| {
+                            let per_slack = multiplier[i] * inverse[i];
+                            multiplier[i]
+                                + back
+                                    * (target - multiplier[i] * (slack[i] + change[i]))
+                                    * per_slack
+                        });
+                        products = each(|i| products[i] + new_slack[i] * new_multiplier[i]);
+                        pair.slack[n] = new_slack;
+                        pair.multiplier[n] = new_multiplier;
+                    }
                 }
             }
-            for n in 0..=Self::BOUNDS {
-                let (slack, multiplier, change) = (
-                    rows.single_slack[n],
-                    rows.single_multiplier[n],
-                    rows.single_residual[n],
-                );
-                rows.single_slack[n] = slack + length * change;
-                rows.single_multiplier[n] =
-                    multiplier + back * (target - multiplier * (slack + change)) / slack;
-                singles += rows.single_slack[n] * rows.single_multiplier[n];
+            for single in &mut rows.singles[..=Self::BOUNDS] {
+                let (slack, multiplier, change) =
+                    (single.slack, single.multiplier, single.residual);
+                single.slack = each(|i| slack[i] + length * change[i]);
+                single.multiplier = each(|i| {
+                    let per_slack = multiplier[i] * single.inverse[i];
+                    multiplier[i]
+                        + back * (target - multiplier[i] * (slack[i] + change[i])) * per_slack
+                });
+                products = each(|i| products[i] + single.slack[i] * single.multiplier[i]);
             }
         }
-        self.gap = self.mean(&pairs, singles);
-        for (coefficient, unknown) in self.rate.coefficients.iter_mut().zip(&self.unknown) {
-            if let Ok(unknown) = usize::try_from(*unknown) {
-                *coefficient += length * self.step[unknown];
-            }
+        self.gap = self.mean(&products);
+        for (coefficient, change) in self.rate.coefficients.iter_mut().zip(&self.change) {
+            *coefficient += length * change;
         }
         length
     }
@@ -492,55 +570,70 @@ impl<const L: usize, const GROUPS: usize> Retimer<L, GROUPS> {
     /// Replaces residuals by the changes of the slacks; gives how far slacks and multipliers may go.
     #[inline(always)]
     fn turn_into_changes(&mut self, target: f64) -> (f64, f64) {
-        // The largest relative decrease of a slack and of a multiplier.
-        let mut most = [0.0; L];
-        let mut max_back = [0.0; L];
-        for (site, rows) in self.sites.iter().zip(&mut self.rows) {
-            let change = |n: usize| {
-                usize::try_from(self.unknown[site.interval + n]).map_or(0.0, |u| self.step[u])
-            };
-            let step = [change(0), change(1), change(2)];
-            let along = [
-                dot(&site.values[0], &step),
-                dot(&site.values[1], &step),
-                dot(&site.values[2], &step),
-            ];
-            for group in 0..GROUPS {
-                let form = &site.forms[group];
-                // Rows of acceleration have no part in b: their weight is 0.
-                let common = along
-                    .get(group)
-                    .map_or(0.0, |along| rows.weight[group] * along);
-                let value: Lanes<L> =
-                    each(|l| form[0][l] * step[0] + form[1][l] * step[1] + form[2][l] * step[2]);
-                for (n, sign) in [1.0, -1.0].into_iter().enumerate() {
-                    let multiplier = &rows.multiplier[group][n];
-                    let residual = rows.residual[group][n];
-                    let change: Lanes<L> = each(|l| -residual[l] - common - sign * value[l]);
-                    rows.residual[group][n] = change;
-                    // Changes over themselves: Δs/s, and that of the multiplier, (target/λ − s − Δs)/s.
-                    let inverse = &rows.inverse[group][n];
-                    let shrinking: Lanes<L> = each(|l| -change[l] * multiplier[l] * inverse[l]);
-                    most = each(|l| larger(most[l], shrinking[l]));
-                    max_back =
-                        each(|l| larger(max_back[l], 1.0 - shrinking[l] - target * inverse[l]));
+        let step = &self.step;
+        self.change.clear();
+        self.change.extend(
+            self.unknown
+                .iter()
+                .map(|unknown| usize::try_from(*unknown).map_or(0.0, |u| step[u])),
+        );
+        let mut reach = Reach::default();
+        for (sites, rows) in self.sites.iter().zip(&mut self.rows) {
+            let step = beta(&self.change, &sites.interval);
+            let along = [0, 1, 2].map(|n| dot(&sites.values[n], &step));
+            for l in &self.moving[..self.moving_count] {
+                for group in 0..GROUPS {
+                    let value = dot(&sites.forms[*l][group], &step);
+                    // Rows of acceleration have no part in b.
+                    let common = match along.get(group) {
+                        Some(along) => each(|i| rows.weight[group][i] * along[i]),
+                        None => [0.0; WIDE],
+                    };
+                    let pair = &mut rows.pairs[*l][group];
+                    for (n, sign) in [1.0, -1.0].into_iter().enumerate() {
+                        let residual = pair.residual[n];
+                        let change: Wide = each(|i| -residual[i] - common[i] - sign * value[i]);
+                        pair.residual[n] = change;
+                        reach.row(&change, &pair.multiplier[n], &pair.inverse[n], target);
+                    }
                 }
             }
             for n in 0..=Self::BOUNDS {
-                let along = if n < Self::BOUNDS {
-                    along[n]
+                let single = &mut rows.singles[n];
+                let residual = single.residual;
+                let change: Wide = if n < Self::BOUNDS {
+                    each(|i| -residual[i] - along[n][i])
                 } else {
-                    -along[1]
+                    each(|i| -residual[i] + along[1][i])
                 };
-                let slack = rows.single_slack[n];
-                let multiplier = rows.single_multiplier[n];
-                let change = -rows.single_residual[n] - along;
-                rows.single_residual[n] = change;
-                most[0] = larger(most[0], -change / slack);
-                max_back[0] = larger(max_back[0], (slack + change - target / multiplier) / slack);
+                single.residual = change;
+                reach.row(&change, &single.multiplier, &single.inverse, target);
             }
         }
-        let length = |most: &Lanes<L>| smaller(1.0, BOUNDARY / larger(largest(most), 1e-9));
-        (length(&most), length(&max_back))
+        reach.lengths()
+    }
+}
+
+/// How far a step may go: the largest decrease of a slack and of a multiplier, over themselves.
+#[derive(Clone, Copy, Debug, Default)]
+struct Reach {
+    slack: Wide,
+    multiplier: Wide,
+}
+
+impl Reach {
+    /// Of a row: Δs/s, and that of the multiplier, (target/λ − s − Δs)/s.
+    #[inline(always)]
+    fn row(&mut self, change: &Wide, multiplier: &Wide, inverse: &Wide, target: f64) {
+        let shrinking: Wide = each(|i| -change[i] * multiplier[i] * inverse[i]);
+        self.slack = each(|i| larger(self.slack[i], shrinking[i]));
+        self.multiplier =
+            each(|i| larger(self.multiplier[i], 1.0 - shrinking[i] - target * inverse[i]));
+    }
+
+    /// Lengths of the step of slacks and of multipliers.
+    fn lengths(&self) -> (f64, f64) {
+        let length = |most: &Wide| smaller(1.0, BOUNDARY / larger(largest(most), 1e-9));
+        (length(&self.slack), length(&self.multiplier))
     }
 }

@@ -1,4 +1,4 @@
-//! The share of the Newton system that three places of an interval have, all axes at once.
+//! The share of the Newton system that three places of an interval have, several intervals at once.
 
 use super::PLACES;
 use crate::lanes::{Lanes, each, larger};
@@ -6,167 +6,192 @@ use crate::lanes::{Lanes, each, larger};
 /// Single rows at most: bounds on b from above at each place, and from below at the second.
 pub const MAX_SINGLES: usize = PLACES + 1;
 
-/// A linear form of an interval's three coefficients, of every lane.
-pub type Form<const L: usize> = [Lanes<L>; 3];
+/// Intervals side by side: four numbers fill a wide register, and none of them is wasted, however many axes there are.
+pub const WIDE: usize = 4;
+/// One number of each of them.
+pub type Wide = Lanes<WIDE>;
 
-/// Slacks, multipliers and residuals of the rows at three places. A group is a pair of rows for every axis.
+/// A linear form of an interval's three coefficients.
+pub type Form = [Wide; 3];
+
+/// Slacks, multipliers and residuals of a pair of rows.
+#[derive(Clone, Copy, Debug)]
+pub struct Pair {
+    pub slack: [Wide; 2],
+    pub multiplier: [Wide; 2],
+    pub residual: [Wide; 2],
+    /// 1 over slack times multiplier: one division gives both their inverses.
+    pub inverse: [Wide; 2],
+}
+
+impl Pair {
+    const NONE: Self = Self {
+        slack: [[0.0; WIDE]; 2],
+        multiplier: [[0.0; WIDE]; 2],
+        residual: [[0.0; WIDE]; 2],
+        inverse: [[0.0; WIDE]; 2],
+    };
+}
+
+/// The same of a single row.
+#[derive(Clone, Copy, Debug)]
+pub struct Single {
+    pub slack: Wide,
+    pub multiplier: Wide,
+    pub residual: Wide,
+    pub inverse: Wide,
+}
+
+impl Single {
+    const NONE: Self = Self {
+        slack: [0.0; WIDE],
+        multiplier: [0.0; WIDE],
+        residual: [0.0; WIDE],
+        inverse: [0.0; WIDE],
+    };
+}
+
+/// The rows at three places: a group is a pair for every axis.
 #[derive(Clone, Copy, Debug)]
 pub struct Rows<const L: usize, const GROUPS: usize> {
-    pub slack: [[Lanes<L>; 2]; GROUPS],
-    pub multiplier: [[Lanes<L>; 2]; GROUPS],
-    pub residual: [[Lanes<L>; 2]; GROUPS],
-    /// 1 over slack times multiplier: one division gives both their inverses.
-    pub inverse: [[Lanes<L>; 2]; GROUPS],
-    /// What multiplies b in the rows of each group, in the last pass.
-    pub weight: [f64; GROUPS],
-    pub single_slack: [f64; MAX_SINGLES],
-    pub single_multiplier: [f64; MAX_SINGLES],
-    pub single_residual: [f64; MAX_SINGLES],
+    pub pairs: [[Pair; GROUPS]; L],
+    /// What multiplies b in the rows of jerk at each place, in the last pass.
+    pub weight: [Wide; PLACES],
+    pub singles: [Single; MAX_SINGLES],
+}
+
+impl<const L: usize, const GROUPS: usize> Rows<L, GROUPS> {
+    pub const NONE: Self = Self {
+        pairs: [[Pair::NONE; GROUPS]; L],
+        weight: [[0.0; WIDE]; PLACES],
+        singles: [Single::NONE; MAX_SINGLES],
+    };
 }
 
 /// The right sides at a place: `weight·b ± form·β ≤ right`.
 #[derive(Clone, Copy, Debug)]
 pub struct Sides {
-    /// Weights of b at the place.
-    pub w: [f64; 3],
-    pub weight: f64,
+    pub weight: Wide,
     /// `weight·b`.
-    pub common: f64,
-    pub right: f64,
+    pub common: Wide,
+    pub right: Wide,
 }
 
-/// Hessian (upper triangle by rows) and gradient, of every lane; their sums over the lanes count.
-#[derive(Clone, Copy, Debug)]
-pub struct Share<const L: usize> {
-    hessian: [Lanes<L>; 6],
-    gradient: [Lanes<L>; 3],
+/// Hessian (upper triangle by rows) and gradient.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Share {
+    pub hessian: [Wide; 6],
+    pub gradient: [Wide; 3],
     /// Largest violation, as a share of the right side.
-    pub violation: Lanes<L>,
+    pub violation: Wide,
 }
 
 const AT: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
 
+/// `w·β`.
 #[inline(always)]
-fn sum<const L: usize>(lanes: &Lanes<L>) -> f64 {
-    let mut sum = 0.0;
-    for value in lanes {
-        sum += value;
-    }
-    sum
+pub fn dot(w: &[Wide; 3], beta: &[Wide; 3]) -> Wide {
+    each(|i| w[0][i] * beta[0][i] + w[1][i] * beta[1][i] + w[2][i] * beta[2][i])
 }
 
-impl<const L: usize> Default for Share<L> {
-    fn default() -> Self {
-        Self {
-            hessian: [[0.0; L]; 6],
-            gradient: [[0.0; L]; 3],
-            violation: [0.0; L],
-        }
-    }
+/// Weight and slope of a row that is `over` its right side; writes its residual.
+#[inline(always)]
+fn row(
+    over: &Wide,
+    (slack, multiplier): (&Wide, &Wide),
+    (residual, inverse): (&mut Wide, &mut Wide),
+    target: f64,
+) -> (Wide, Wide) {
+    *residual = each(|i| over[i] + slack[i]);
+    *inverse = each(|i| 1.0 / (slack[i] * multiplier[i]));
+    let per_slack: Wide = each(|i| multiplier[i] * inverse[i]);
+    (
+        each(|i| multiplier[i] * per_slack[i]),
+        each(|i| (target + multiplier[i] * residual[i]) * per_slack[i]),
+    )
 }
 
-impl<const L: usize> Share<L> {
-    /// Adds the pair of rows `group`.
+/// Weights and slopes of a pair of rows that are `over` their right sides.
+#[inline(always)]
+fn both(over: &[Wide; 2], pair: &mut Pair, target: f64) -> ([Wide; 2], [Wide; 2]) {
+    let [mut d, mut g] = [[[0.0; WIDE]; 2]; 2];
+    for n in 0..2 {
+        (d[n], g[n]) = row(
+            &over[n],
+            (&pair.slack[n], &pair.multiplier[n]),
+            (&mut pair.residual[n], &mut pair.inverse[n]),
+            target,
+        );
+    }
+    (d, g)
+}
+
+impl Share {
+    /// Adds a pair of rows of jerk at `place`; `common` is its weight times the weights of b.
     #[inline(always)]
-    pub fn pair<const GROUPS: usize>(
+    pub fn jerk(
         &mut self,
-        form: &Form<L>,
-        beta: &[f64; 3],
-        sides: &Sides,
-        rows: &mut Rows<L, GROUPS>,
-        group: usize,
+        form: &Form,
+        beta: &[Wide; 3],
+        (place, common): (&Sides, &[Wide; 3]),
+        pair: &mut Pair,
         target: f64,
     ) {
-        let value: Lanes<L> =
-            each(|l| form[0][l] * beta[0] + form[1][l] * beta[1] + form[2][l] * beta[2]);
-        let over = sides.common - sides.right;
-        rows.weight[group] = sides.weight;
-        self.violation = each(|l| larger(self.violation[l], over + value[l].abs()));
-        let [mut d, mut g] = [[[0.0; L]; 2]; 2];
-        for (n, sign) in [1.0, -1.0].into_iter().enumerate() {
-            let slack = &rows.slack[group][n];
-            let multiplier = &rows.multiplier[group][n];
-            let residual: Lanes<L> = each(|l| over + sign * value[l] + slack[l]);
-            rows.residual[group][n] = residual;
-            let inverse: Lanes<L> = each(|l| 1.0 / (slack[l] * multiplier[l]));
-            rows.inverse[group][n] = inverse;
-            let per_slack: Lanes<L> = each(|l| multiplier[l] * inverse[l]);
-            d[n] = each(|l| multiplier[l] * per_slack[l]);
-            g[n] = each(|l| (target + multiplier[l] * residual[l]) * per_slack[l]);
-        }
-        let (sum, gap): (Lanes<L>, Lanes<L>) =
-            (each(|l| d[0][l] + d[1][l]), each(|l| d[0][l] - d[1][l]));
-        let common = [
-            sides.w[0] * sides.weight,
-            sides.w[1] * sides.weight,
-            sides.w[2] * sides.weight,
-        ];
-        for (n, (i, j)) in AT.into_iter().enumerate() {
-            let both = common[i] * common[j];
-            let entry = &mut self.hessian[n];
-            *entry = each(|l| {
-                entry[l]
-                    + sum[l] * (form[i][l] * form[j][l] + both)
-                    + gap[l] * (form[i][l] * common[j] + form[j][l] * common[i])
-            });
-        }
-        for i in 0..3 {
-            let entry = &mut self.gradient[i];
-            *entry = each(|l| {
-                entry[l] + (g[0][l] - g[1][l]) * form[i][l] + (g[0][l] + g[1][l]) * common[i]
-            });
-        }
+        let value = dot(form, beta);
+        let over: Wide = each(|i| place.common[i] - place.right[i]);
+        let over = [each(|i| over[i] + value[i]), each(|i| over[i] - value[i])];
+        self.violation = each(|i| larger(larger(self.violation[i], over[0][i]), over[1][i]));
+        let (d, g) = both(&over, pair, target);
+        let plus = [0, 1, 2].map(|n| each(|i| common[n][i] + form[n][i]));
+        let minus = [0, 1, 2].map(|n| each(|i| common[n][i] - form[n][i]));
+        self.add(&plus, &d[0], &g[0]);
+        self.add(&minus, &d[1], &g[1]);
+    }
+
+    /// Adds a pair of rows of acceleration, which is linear in b: `±form·β ≤ 1`.
+    #[inline(always)]
+    pub fn acceleration(&mut self, form: &Form, beta: &[Wide; 3], pair: &mut Pair, target: f64) {
+        let value = dot(form, beta);
+        let over = [each(|i| value[i] - 1.0), each(|i| -value[i] - 1.0)];
+        self.violation = each(|i| larger(larger(self.violation[i], over[0][i]), over[1][i]));
+        let (d, g) = both(&over, pair, target);
+        let bend = each(|i| d[0][i] + d[1][i]);
+        let slope = each(|i| g[0][i] - g[1][i]);
+        self.add(form, &bend, &slope);
     }
 
     /// Adds the single row `sign·w·β ≤ …` that is `over` its right side.
     #[inline(always)]
-    pub fn single<const GROUPS: usize>(
+    pub fn single(
         &mut self,
-        w: &[f64; 3],
+        w: &[Wide; 3],
         sign: f64,
-        over: f64,
-        rows: &mut Rows<L, GROUPS>,
-        index: usize,
+        over: &Wide,
+        single: &mut Single,
         target: f64,
     ) {
-        let slack = rows.single_slack[index];
-        let multiplier = rows.single_multiplier[index];
-        rows.single_residual[index] = over + slack;
-        self.violation[0] = larger(self.violation[0], over);
-        let per_slack = 1.0 / slack;
-        self.add(
-            w,
-            multiplier * per_slack,
-            sign * (target + multiplier * (over + slack)) * per_slack,
+        self.violation = each(|i| larger(self.violation[i], over[i]));
+        let (bend, slope) = row(
+            over,
+            (&single.slack, &single.multiplier),
+            (&mut single.residual, &mut single.inverse),
+            target,
         );
+        let slope = each(|i| sign * slope[i]);
+        self.add(w, &bend, &slope);
     }
 
     /// Adds `bend·w·wᵀ` and `slope·w`.
     #[inline(always)]
-    pub fn add(&mut self, w: &[f64; 3], bend: f64, slope: f64) {
-        for (n, (i, j)) in AT.into_iter().enumerate() {
-            self.hessian[n][0] += bend * w[i] * w[j];
+    pub fn add(&mut self, w: &[Wide; 3], bend: &Wide, slope: &Wide) {
+        let bent: [Wide; 3] = [0, 1, 2].map(|n| each(|i| bend[i] * w[n][i]));
+        for (n, (a, b)) in AT.into_iter().enumerate() {
+            let entry = self.hessian[n];
+            self.hessian[n] = each(|i| entry[i] + bent[a][i] * w[b][i]);
         }
-        for i in 0..3 {
-            self.gradient[i][0] += slope * w[i];
+        for n in 0..3 {
+            let entry = self.gradient[n];
+            self.gradient[n] = each(|i| entry[i] + slope[i] * w[n][i]);
         }
-    }
-
-    /// The sums over the lanes.
-    #[inline(always)]
-    pub fn sums(&self) -> ([f64; 6], [f64; 3]) {
-        let h = &self.hessian;
-        let g = &self.gradient;
-        (
-            [
-                sum(&h[0]),
-                sum(&h[1]),
-                sum(&h[2]),
-                sum(&h[3]),
-                sum(&h[4]),
-                sum(&h[5]),
-            ],
-            [sum(&g[0]), sum(&g[1]), sum(&g[2])],
-        )
     }
 }

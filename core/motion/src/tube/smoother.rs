@@ -141,7 +141,7 @@ impl<const L: usize> Smoother<L> {
             let free = 3..spline.points.len() - 3;
             banded::solve(&mut self.matrix[free.clone()], &mut self.step[free]);
             let length = self.advance(spline, &target);
-            shrink = each(|l| if length[l] > 0.8 { 0.05 } else { 0.4 });
+            shrink = each(|l| if length[l] > 0.8 { 0.03 } else { 0.4 });
             gap = self.gap();
             status.iterations += 1;
         }
