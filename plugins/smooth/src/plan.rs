@@ -32,10 +32,10 @@ const MIN_RATE_SQUARED: f64 = 0.01;
 /// Groups of rows of an interval: jerk at three places, acceleration at its start.
 const RETIMED: usize = 4;
 /// Mean complementarity asked of the last round, and of those before.
-const GAP: f64 = 2e-5;
+const GAP: f64 = 1e-5;
 const LOOSE: f64 = 3e-3;
 /// Gain of a round, as a share of the time, that is worth another.
-const GAIN: f64 = 4e-3;
+const GAIN: f64 = 2e-3;
 
 /// What can be tuned.
 #[derive(Clone, Copy, Debug, PartialEq)]
