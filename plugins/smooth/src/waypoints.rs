@@ -172,7 +172,7 @@ impl<const L: usize> Waypoints<L> {
         for n in 0..self.candidates.len() {
             let candidate = self.candidates[n];
             let t = timer.time(candidate.s);
-            if t < last_t + if candidate.firm { h / DENSEST } else { h / 3.0 } {
+            if t < last_t + if candidate.firm { h / DENSEST } else { h / 3.5 } {
                 continue;
             }
             self.fill(run, marks, &mut last_t, t, grid, keep);
