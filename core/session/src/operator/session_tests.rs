@@ -1,10 +1,9 @@
 //! Conversations without sockets.
 
-use std::time::Duration;
-
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
+use std::time::Duration;
 
 use serde_json::Value;
 use tandem_machine::Machine;
