@@ -369,6 +369,25 @@ fn the_ring_runs_dry_smoothly_wherever_the_rough_loop_can_be_late() {
     assert!(starved > 20 || std::env::var("TANDEM_TICK").is_ok());
 }
 
+/// Circles that are driven as fast as the jerk allows leave next to none of it to begin a stop with: the queue is as deep as that takes.
+#[test]
+fn a_starved_machine_rests_on_circles_that_use_all_of_the_jerk() {
+    for_each_seed("a_starved_machine_rests_on_circles", 24, |seed| {
+        let mut random = Random::new(seed ^ 1 << 44);
+        let radius = random.between(0.3, 3.0);
+        let mut text = "G21 G90 G17 G64 P0.01\nF15000\n".to_string();
+        for _ in 0..8 {
+            writeln!(text, "G2 X0 Y0 I{radius:.3} J0").unwrap();
+        }
+        text.push_str("M2\n");
+        let bench = bench(&text);
+        let free = bench.run("");
+        let tick = random.below(free.samples.len() as u64);
+        let ran = bench.run(&format!("{tick},stall-rough,100"));
+        check(&bench, &ran).map_err(|e| format!("radius {radius:.3} mm, tick {tick}: {e}"))
+    });
+}
+
 #[test]
 fn override_steps_are_followed_smoothly() {
     for_each_seed("override_steps_are_followed_smoothly", 60, |seed| {

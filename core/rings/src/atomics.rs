@@ -30,6 +30,10 @@ pub const STOP_SHARE: f64 = 0.95;
 /// Share of the jerk that both loops count on for a stop: turning, and the plan's own jerk, take what they need.
 pub const STOP_JERK_SHARE: f64 = 0.8;
 
+/// Share of the jerk limit that a change of the rate has at least, where the plan uses all of it: without any it would never leave a
+/// rest there, and a stop would never begin. The one tolerance on jerk covers it.
+pub const MIN_JERK_SHARE: f64 = 0.006;
+
 /// Most entries of the ring that the fine loop looks at in one period, whatever the period.
 pub const MAX_ENTRIES: usize = 250;
 
@@ -52,8 +56,8 @@ pub struct Depth {
     /// Longest stop of any queued segment from its own speed with its own deceleration, s of program time: a bound on every
     /// stop where speeds and decelerations of the queue differ by much; infinite where nothing moves.
     pub stop_s: AtomicF64,
-    /// Longest time in which that deceleration can be built up, s; zero where no jerk limit is kept.
-    pub stop_ramp_s: AtomicF64,
+    /// Longest time in which that deceleration is built up, s; zero where no jerk limit is kept.
+    pub build_up_s: AtomicF64,
     /// Program time at which the queue ends; infinite where it ends at rest.
     pub wall_s: AtomicF64,
     /// Program time that must lie before the wall for motion to start (or start again), s: the worst stop; zero where the
@@ -78,7 +82,7 @@ impl Depth {
         self.required_s.store(f64::INFINITY);
         self.stop_deceleration_mm_per_s2.store(f64::INFINITY);
         self.stop_s.store(f64::INFINITY);
-        self.stop_ramp_s.store(0.0);
+        self.build_up_s.store(0.0);
         self.full.store(false, Ordering::Release);
         self.max_rate.store(1.0);
         self.wall_s.store(now_s);
@@ -103,7 +107,7 @@ impl Default for Depth {
         Self {
             stop_deceleration_mm_per_s2: AtomicF64::new(f64::INFINITY),
             stop_s: AtomicF64::new(f64::INFINITY),
-            stop_ramp_s: AtomicF64::new(0.0),
+            build_up_s: AtomicF64::new(0.0),
             wall_s: AtomicF64::new(0.0),
             required_s: AtomicF64::new(f64::INFINITY),
             full: AtomicBool::new(false),
@@ -154,7 +158,7 @@ mod tests {
         for (number, shared) in [
             &depth.stop_deceleration_mm_per_s2,
             &depth.stop_s,
-            &depth.stop_ramp_s,
+            &depth.build_up_s,
             &depth.wall_s,
             &depth.required_s,
             &depth.max_rate,
@@ -169,10 +173,7 @@ mod tests {
         assert!(depth.is_of(3) && !depth.is_of(0));
         assert!(!depth.may_start(0.0), "nothing of it is queued");
         assert_eq!(depth.wall_s.load(), 7.0);
-        assert_eq!(
-            (depth.max_rate.load(), depth.stop_ramp_s.load()),
-            (1.0, 0.0)
-        );
+        assert_eq!((depth.max_rate.load(), depth.build_up_s.load()), (1.0, 0.0));
         let stops = [&depth.stop_deceleration_mm_per_s2, &depth.stop_s];
         assert!(stops.iter().all(|stop| stop.load() == f64::INFINITY));
         assert!(!depth.full.load(Ordering::Acquire));

@@ -14,7 +14,8 @@ mod sample;
 mod switched;
 
 pub use atomics::{
-    AtomicF64, Depth, MAX_ENTRIES, STOP_JERK_SHARE, STOP_SHARE, max_entries_a_period,
+    AtomicF64, Depth, MAX_ENTRIES, MIN_JERK_SHARE, STOP_JERK_SHARE, STOP_SHARE,
+    max_entries_a_period,
 };
 pub use controls::{BusStatus, Controls, JogControls, JointStatus, SpindleStatus, Status};
 pub use counts::{Counters, Counts};

@@ -7,13 +7,14 @@
 //! greatest path speed v and the smallest declared deceleration `a_s` of all that is queued and keeps at least
 //!
 //! ```text
-//! v / (0.95·a_s) + a_s/(0.8·J) + two rough periods
+//! v / (0.95·a_s) + a_s/(0.8·J) + easing + two rough periods
 //! ```
 //!
 //! of program time in the ring, and three rough periods more as margin. v is the highest speed queued and `a_s` the least
 //! deceleration; where the longest `v/a_s` of a single segment is shorter, that counts, for σ falls by `a_s/v` at each
 //! place: where a rotary axis turns much on little path, both are small. `a_s/J`, the time in which the deceleration is
-//! built up, is what segments of order 3 declare as the quotient of their two bounds on σ; it is zero for order 2.
+//! built up, is what segments of order 3 declare as the quotient of their two bounds on σ. Easing is the time
+//! before that in which a plan that uses the jerk itself leaves little of it (`easing.rs`). Both are zero for order 2.
 //! `0.95` is what the fine loop counts on, because the governor stays 0.1 % inside the limits and acts from the next
 //! period on. v/(2a) would do only for a plan that cruises: a plan that already brakes consumes its queue faster, and
 //! the fine loop counts on `v/a_s`. With half the depth a fast program starves without any stall, again and again;
@@ -45,6 +46,7 @@
 
 use std::collections::VecDeque;
 
+use crate::easing::{EASED, Easing};
 use crate::window::SlidingMax;
 use tandem_rings::{STOP_JERK_SHARE, STOP_SHARE, max_entries_a_period};
 use tandem_sdk::{Segment, SegmentFlags};
@@ -60,6 +62,9 @@ pub struct QueueDepth {
     stops: SlidingMax,
     /// Times in which the deceleration is built up, s.
     ramps: SlidingMax,
+    /// Times before that in which the plan leaves little jerk, s.
+    easings: SlidingMax,
+    easing: Easing,
     braking: Braking,
     /// Negative rates at which entries come no denser than the fine loop looks at them.
     dense: SlidingMax,
@@ -131,12 +136,14 @@ const MIN_RATE: f64 = 1e-3;
 
 impl QueueDepth {
     /// Nothing queued. `factor` is the share of the worst stop that is asked for, 1 but in tests.
-    pub fn new(rough_period_s: f64, fine_period_s: f64, factor: f64) -> Self {
+    pub fn new(rough_period_s: f64, fine_period_s: f64, factor: f64, easing: Easing) -> Self {
         Self {
             speeds: SlidingMax::default(),
             decelerations: SlidingMax::default(),
             stops: SlidingMax::default(),
             ramps: SlidingMax::default(),
+            easings: SlidingMax::default(),
+            easing,
             braking: Braking::default(),
             dense: SlidingMax::default(),
             ends_s: vec![f64::NEG_INFINITY; max_entries_a_period(fine_period_s)].into_boxed_slice(),
@@ -154,7 +161,12 @@ impl QueueDepth {
 
     /// Nothing is queued any more.
     pub fn clear(&mut self) {
-        *self = Self::new(self.rough_period_s, self.fine_period_s, self.factor);
+        *self = Self::new(
+            self.rough_period_s,
+            self.fine_period_s,
+            self.factor,
+            self.easing,
+        );
     }
 
     /// A segment has been queued that ends at `until_s`.
@@ -187,6 +199,10 @@ impl QueueDepth {
         if ramp_s > 0.0 {
             self.ramps.push(ramp_s, until_s);
         }
+        let easing_s = self.easing.longest_s(segment);
+        if easing_s > 0.0 {
+            self.easings.push(easing_s, until_s);
+        }
     }
 
     /// The fine loop has come to `now_s`.
@@ -195,6 +211,7 @@ impl QueueDepth {
         self.decelerations.forget(now_s);
         self.stops.forget(now_s);
         self.ramps.forget(now_s);
+        self.easings.forget(now_s);
         self.braking.forget(now_s);
         self.dense.forget(now_s);
     }
@@ -218,12 +235,15 @@ impl QueueDepth {
 
     /// Highest rate of program time from which the machine comes to rest between `now_s` and `wall_s`, where the queue gets
     /// no deeper. Before it brakes it drives on for as long as the rough loop may be late, and builds its deceleration up;
-    /// the same once more is for following what is said here.
+    /// the same once more is for following what is said here. Below some rate every plan leaves jerk to begin with.
     pub fn rate_for_wall(&self, now_s: f64, wall_s: f64) -> f64 {
         let late_s = (SERVED_FOR_PERIODS + 1.0) * self.rough_period_s + 3.0 * self.fine_period_s;
-        let before_s = late_s + 2.0 * self.stop_ramp_s() / STOP_JERK_SHARE;
+        let built_s = late_s + 2.0 * self.ramp_s();
+        let easing_s = self.easing_s();
         let end = self.braking.before(wall_s);
         let fits = |rate: f64| {
+            let eases = rate > 1.0 - EASED;
+            let before_s = built_s + if eases { easing_s } else { 0.0 };
             end - self.braking.behind(now_s + rate * before_s) >= rate * rate / (2.0 * STOP_SHARE)
         };
         if fits(1.0) {
@@ -251,12 +271,22 @@ impl QueueDepth {
         self.stops.max().unwrap_or(f64::INFINITY)
     }
 
-    /// Longest time in which a deceleration queued is built up, s.
-    pub fn stop_ramp_s(&self) -> f64 {
-        self.ramps.max().unwrap_or(0.0)
+    /// Longest time in which a deceleration queued is built up with the share of the jerk that is counted on, s.
+    fn ramp_s(&self) -> f64 {
+        self.ramps.max().unwrap_or(0.0) / STOP_JERK_SHARE
     }
 
-    /// Program time that must be queued, s: the worst stop `v/a_s + a_s/J` and two rough periods. Of highest speed over least
+    /// Longest time before that in which the plan leaves little jerk, s.
+    fn easing_s(&self) -> f64 {
+        self.easings.max().unwrap_or(0.0)
+    }
+
+    /// Longest time before a stop has the deceleration that is declared, s.
+    pub fn build_up_s(&self) -> f64 {
+        self.ramp_s() + self.easing_s()
+    }
+
+    /// Program time that must be queued, s: the worst stop, `v/a_s` and what builds it up, and two rough periods. Of highest speed over least
     /// deceleration and the longest of single segments the shorter one counts.
     pub fn required_s(&self) -> f64 {
         let worst_s = self
@@ -264,7 +294,7 @@ impl QueueDepth {
             .max()
             .map_or(0.0, |v| v / self.stop_deceleration_mm_per_s2());
         let worst_s = worst_s.min(self.stop_s()) / STOP_SHARE;
-        self.factor * (worst_s + self.stop_ramp_s() / STOP_JERK_SHARE) + 2.0 * self.rough_period_s
+        self.factor * (worst_s + self.build_up_s()) + 2.0 * self.rough_period_s
     }
 }
 
@@ -283,7 +313,7 @@ mod tests {
 
     #[test]
     fn the_worst_stop_of_equal_segments_is_speed_over_deceleration() {
-        let mut depth = QueueDepth::new(0.01, 0.001, 1.0);
+        let mut depth = QueueDepth::new(0.01, 0.001, 1.0, Easing::NONE);
         depth.push(&level(50.0, 100.0), 1.0);
         depth.push(&level(20.0, 100.0), 2.0);
         assert!((depth.required_s() - (0.5 / STOP_SHARE + 0.02)).abs() < 1e-12);
@@ -291,7 +321,7 @@ mod tests {
 
     #[test]
     fn a_slow_segment_that_leaves_little_does_not_lengthen_the_stop_of_a_fast_one() {
-        let mut depth = QueueDepth::new(0.01, 0.001, 1.0);
+        let mut depth = QueueDepth::new(0.01, 0.001, 1.0, Easing::NONE);
         depth.push(&level(50.0, 1000.0), 1.0);
         depth.push(&level(0.004, 0.05), 2.0);
         assert!((depth.required_s() - (0.08 / STOP_SHARE + 0.02)).abs() < 1e-12);
@@ -301,7 +331,7 @@ mod tests {
 
     /// A queue of pieces of 2 ms whose speeds and decelerations go up and down over two decades.
     fn uneven(pieces: u32) -> (QueueDepth, Vec<(f64, f64)>) {
-        let mut depth = QueueDepth::new(0.01, 0.001, 1.0);
+        let mut depth = QueueDepth::new(0.01, 0.001, 1.0, Easing::NONE);
         let mut stops = vec![];
         for piece in 0..pieces {
             let phase = f64::from(piece) * 0.05;
@@ -345,7 +375,7 @@ mod tests {
 
     #[test]
     fn the_fastest_place_of_a_segment_counts_wherever_it_is() {
-        let mut depth = QueueDepth::new(0.01, 0.001, 1.0);
+        let mut depth = QueueDepth::new(0.01, 0.001, 1.0, Easing::NONE);
         // From rest over 50 mm/s in the middle to rest, within half a second.
         let mut segment = level(0.0, 100.0);
         segment.duration_s = 0.5;
@@ -365,22 +395,28 @@ mod tests {
 
     #[test]
     fn what_is_passed_no_longer_counts_and_what_builds_a_deceleration_up_does() {
-        let mut depth = QueueDepth::new(0.01, 0.001, 1.0);
+        let mut depth = QueueDepth::new(0.01, 0.001, 1.0, Easing::NONE);
         depth.push(&built_up(&level(50.0, 100.0), 0.16), 1.0);
         depth.push(&built_up(&level(20.0, 1000.0), 0.04), 2.0);
         let first_s = 0.5 / STOP_SHARE + 0.16 / STOP_JERK_SHARE + 0.02;
         assert!((depth.required_s() - first_s).abs() < 1e-12);
-        assert_eq!((depth.stop_s(), depth.stop_ramp_s()), (0.5, 0.16));
+        assert_eq!(
+            (depth.stop_s(), depth.build_up_s()),
+            (0.5, 0.16 / STOP_JERK_SHARE)
+        );
         depth.passed(1.5);
-        assert_eq!((depth.stop_s(), depth.stop_ramp_s()), (0.02, 0.04));
+        assert_eq!(
+            (depth.stop_s(), depth.build_up_s()),
+            (0.02, 0.04 / STOP_JERK_SHARE)
+        );
         assert_eq!(depth.stop_deceleration_mm_per_s2(), 1000.0);
         depth.passed(2.5);
-        assert_eq!((depth.stop_s(), depth.stop_ramp_s()), (f64::INFINITY, 0.0));
+        assert_eq!((depth.stop_s(), depth.build_up_s()), (f64::INFINITY, 0.0));
     }
 
     /// Pieces of 2 ms at 50 mm/s that leave 100 mm/s²; the last one as it is changed.
     fn even(pieces: u32, last: impl Fn(&mut Segment)) -> QueueDepth {
-        let mut depth = QueueDepth::new(0.01, 0.001, 1.0);
+        let mut depth = QueueDepth::new(0.01, 0.001, 1.0, Easing::NONE);
         for piece in 1..=pieces {
             let mut segment = level(50.0, 100.0);
             (segment.duration_s, segment.flags) = (0.002, SegmentFlags::default());
@@ -419,7 +455,7 @@ mod tests {
 
     #[test]
     fn a_queue_that_leaves_nothing_to_brake_with_is_still_driven_out_of() {
-        let mut depth = QueueDepth::new(0.01, 0.001, 1.0);
+        let mut depth = QueueDepth::new(0.01, 0.001, 1.0, Easing::NONE);
         depth.push(
             &Segment {
                 flags: SegmentFlags::default(),
@@ -432,7 +468,7 @@ mod tests {
 
     #[test]
     fn more_entries_than_a_period_has_time_for_slow_program_time_until_they_are_passed() {
-        let mut depth = QueueDepth::new(0.01, 0.001, 1.0);
+        let mut depth = QueueDepth::new(0.01, 0.001, 1.0, Easing::NONE);
         depth.push(&level(50.0, 100.0), 1.0);
         assert_eq!(depth.rate_for_entries(), 1.0);
         let most = max_entries_a_period(0.001);

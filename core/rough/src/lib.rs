@@ -4,6 +4,7 @@
 mod depth;
 #[cfg(test)]
 mod doubles;
+mod easing;
 mod gather;
 mod policy;
 mod queue;
@@ -14,6 +15,7 @@ mod source;
 mod window;
 
 pub use depth::QueueDepth;
+pub use easing::{Easing, easing_s};
 pub use gather::Slowness;
 pub use policy::{BlockPolicy, Tuned, WINDOW_BLOCKS};
 pub use rough::{Progress, RoughConfig, RoughError, RoughLoop};

@@ -222,7 +222,7 @@ impl Queue {
             .stop_deceleration_mm_per_s2
             .store(self.depth.stop_deceleration_mm_per_s2());
         shared.stop_s.store(self.depth.stop_s());
-        shared.stop_ramp_s.store(self.depth.stop_ramp_s());
+        shared.build_up_s.store(self.depth.build_up_s());
         shared.wall_s.store(if self.ends_at_rest {
             f64::INFINITY
         } else {

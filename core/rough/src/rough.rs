@@ -6,6 +6,7 @@ use tandem_sdk::{Accepted, AxisLimits, Edge, Event, EventKind, NurbsData, Planne
 
 use crate::Observer;
 use crate::depth::QueueDepth;
+use crate::easing::Easing;
 use crate::gather::{Gathering, Slowness};
 use crate::queue::Queue;
 use crate::seams::{ROUNDING, Seams};
@@ -34,6 +35,8 @@ pub struct RoughConfig {
     pub seam_rounding: [f64; 2],
     /// How slowly the linear axes change their speed: how long a sender's lines are gathered follows from it.
     pub slowness: Slowness,
+    /// The jerk limits that a stop keeps.
+    pub easing: Easing,
 }
 
 impl RoughConfig {
@@ -47,6 +50,7 @@ impl RoughConfig {
             depth_factor: 1.0,
             seam_rounding: ROUNDING,
             slowness: Slowness::NONE,
+            easing: Easing::NONE,
         }
     }
 
@@ -170,6 +174,7 @@ impl RoughLoop {
                     config.rough_period_s,
                     config.fine_period_s,
                     config.depth_factor,
+                    config.easing,
                 ),
                 Seams::new(config.seam_rounding),
             ),

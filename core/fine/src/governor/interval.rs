@@ -1,6 +1,6 @@
 //! What the limits of an axis leave of σ̈ in a period: its acceleration and its jerk are linear in it.
 
-use super::tuning::MIN_JERK_SHARE;
+use tandem_rings::MIN_JERK_SHARE;
 
 /// The rate of program time at a point of a period, were σ̈ zero.
 #[derive(Clone, Copy, Debug)]

@@ -17,10 +17,6 @@ pub const ACCELERATION_SHARE: f64 = 0.998;
 /// Order 3: share of the jerk limit that is used at the points of a period, for the same reason.
 pub const JERK_SHARE: f64 = 0.997;
 
-/// Order 3: share of the jerk limit that a change of the rate has at least, where the plan uses all of it: without any it would
-/// never leave a rest there. The one tolerance on jerk covers it.
-pub const MIN_JERK_SHARE: f64 = 0.006;
-
 /// Order 3: by which share of the limit jerk goes beyond it where it must: the first that leaves a rate is taken.
 pub const EXCESSES: [f64; 8] = [0.01, 0.03, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2];
 

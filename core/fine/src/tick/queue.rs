@@ -2,7 +2,7 @@
 
 use std::sync::atomic::Ordering::Acquire;
 
-use tandem_rings::{Depth, STOP_JERK_SHARE, STOP_SHARE};
+use tandem_rings::{Depth, STOP_SHARE};
 
 /// Fine periods in which a stop has not begun to slow the machine: the one in which the queue is looked at, the one in which the rate
 /// is chosen, and the one in which it begins to fall.
@@ -57,11 +57,10 @@ impl QueueWatch {
         let speed = sigma * planned_mm_per_s;
         let deceleration = depth.stop_deceleration_mm_per_s2.load();
         // The governor keeps a margin, so it brakes with a share of the declared deceleration. The rough loop keeps the ring as deep
-        // as this asks, with the same two shares (core/rough/src/depth.rs): with a lower share here a ring that is deep enough would
-        // starve, and with a higher one the machine would brake too late.
-        let ramp_s = depth.stop_ramp_s.load() / STOP_JERK_SHARE;
+        // as this asks, with the same share and the same time of building up (core/rough/src/depth.rs): with a lower share here a ring
+        // that is deep enough would starve, and with a higher one the machine would brake too late.
         let stop_s = (speed / deceleration).min(sigma * depth.stop_s.load()) / STOP_SHARE;
-        let stop_s = stop_s + ramp_s + REACTION_PERIODS * period_s;
+        let stop_s = stop_s + depth.build_up_s.load() + REACTION_PERIODS * period_s;
         let unserved_s = f64::from(self.unserved) * period_s;
         let deep_as_can_be = depth.full.load(Acquire) && unserved_s <= depth.served_for_s.load();
         self.starved = speed > 0.0 && wall_s - now_s < stop_s && !deep_as_can_be;

@@ -109,6 +109,7 @@ impl Made {
         rough_config.advance_s = parts::advance_s(machine.rough_period_s, depth_s, segments);
         rough_config.awaits_drives = true;
         for (axis, limits) in config.limits.axes().iter().enumerate() {
+            rough_config.easing.count(axis, limits.jerk_mm_per_s3);
             rough_config.count_steps_of(limits.acceleration_mm_per_s2, limits.jerk_mm_per_s3);
             if !machine.axes.is_rotary(axis) {
                 rough_config.gather_for(limits);

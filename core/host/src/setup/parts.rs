@@ -6,6 +6,7 @@ use tandem_fine::{FineConfig, HomeSwitch, MissedLimits};
 use tandem_gcode::{Config, Lines, ProbeInput, Stream, Tool};
 use tandem_machine::{GuardMode, Machine};
 use tandem_rings::{STOP_JERK_SHARE, STOP_SHARE};
+use tandem_rough::easing_s;
 use tandem_rough::{Source, Tuned};
 use tandem_sdk::{
     Attached, AxisLimits, AxisVector, DriverDescription, FeedStrategy, Limits, MAX_AXES, Name,
@@ -285,13 +286,13 @@ const LEFT_IN_TURNS: f64 = 0.6;
 pub fn queue_depth_s(machine: &Machine, joints: &JointSpace, order: u32) -> f64 {
     let stop_s = |limits: &AxisLimits| {
         let speed = limits.feed_mm_per_s.max(limits.rapid_mm_per_s);
-        let ramp_s = if order >= 3 {
-            limits.acceleration_mm_per_s2 / limits.jerk_mm_per_s3
+        let build_up_s = if order >= 3 {
+            let ramp_s = limits.acceleration_mm_per_s2 / limits.jerk_mm_per_s3;
+            2.0 * ramp_s / STOP_JERK_SHARE + easing_s(0.0, limits.jerk_mm_per_s3 / speed)
         } else {
             0.0
         };
-        speed / (LEFT_IN_TURNS * STOP_SHARE * limits.acceleration_mm_per_s2)
-            + 2.0 * ramp_s / STOP_JERK_SHARE
+        speed / (LEFT_IN_TURNS * STOP_SHARE * limits.acceleration_mm_per_s2) + build_up_s
     };
     let worst_s = joints
         .limits

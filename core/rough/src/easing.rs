@@ -1,0 +1,154 @@
+//! How long a stop takes to begin where the plan itself uses the jerk that braking needs.
+//!
+//! A circle that is driven as fast as the jerk allows leaves none of it to brake with. But what a plan uses shrinks with the cube of
+//! the rate σ of program time: what little slower the machine is leaves a little jerk, and with that it gets slower yet. With δ = 1 − σ,
+//! g the σ̈ that the whole jerk limit is worth there and r the share of it that is left at σ = 1, for small δ
+//!
+//! ```text
+//! δ̈ = g·(r + 3δ), so δ = r/3·(cosh(√(3g)·t) − 1)
+//! ```
+//!
+//! Once δ is 0.2 the plan uses half of the jerk, and the stop goes on as any other. With r = 1 that takes no longer than any other stop,
+//! so what counts is the difference to it. Where r + 3δ is less than [`MIN_JERK_SHARE`], the fine loop begins with that share. So r counts
+//! as half of that at least: with all of it the beginning would be counted twice, and a stop would be expected a tenth too early.
+
+use tandem_rings::MIN_JERK_SHARE;
+use tandem_sdk::{MAX_AXES, Segment};
+
+/// By how much the rate has fallen when the plan uses half of the jerk: 1 − 0.8³ is half.
+pub const EASED: f64 = 0.2;
+
+/// The jerk limits that a stop goes by.
+#[derive(Clone, Copy, Debug)]
+pub struct Easing {
+    /// mm/s³; infinite where none is kept.
+    jerk_mm_per_s3: [f64; MAX_AXES],
+}
+
+impl Easing {
+    /// No limits: a stop begins at once.
+    pub const NONE: Self = Self {
+        jerk_mm_per_s3: [f64::INFINITY; MAX_AXES],
+    };
+
+    /// Makes a stop keep the jerk limit of `axis`, mm/s³. Host.
+    pub fn count(&mut self, axis: usize, jerk_mm_per_s3: f64) {
+        self.jerk_mm_per_s3[axis] = jerk_mm_per_s3;
+    }
+
+    /// Longest time in which a stop in `segment` begins, beyond what any stop takes, s. Zero for plans that keep no jerk limit.
+    pub fn longest_s(&self, segment: &Segment) -> f64 {
+        if segment.order < 3 {
+            return 0.0;
+        }
+        [0.0, 0.5, 1.0]
+            .map(|share| self.at_s(segment, share * segment.duration_s))
+            .into_iter()
+            .fold(0.0, f64::max)
+    }
+
+    /// The same at the local time `t_s`. What the plan itself brakes with along the path need not be left.
+    fn at_s(&self, segment: &Segment, t_s: f64) -> f64 {
+        let (mut whole, mut left) = (f64::INFINITY, f64::INFINITY);
+        for (c, limit) in segment.coefficients.iter().zip(&self.jerk_mm_per_s3) {
+            let (velocity, jerk) = derivatives(c, t_s);
+            if velocity != 0.0 && limit.is_finite() {
+                whole = whole.min(limit / velocity.abs());
+                left = left.min((limit + velocity.signum() * jerk) / velocity.abs());
+            }
+        }
+        let (speed, path_jerk) = derivatives(&segment.path, t_s);
+        if whole.is_infinite() || speed <= 0.0 {
+            return 0.0;
+        }
+        let brakes = (-path_jerk / speed).max(0.0);
+        easing_s((left + brakes) / whole, whole)
+    }
+}
+
+/// Time in which a stop begins beyond what any stop takes, s, where the plan leaves the share `left` of the jerk limits, which are
+/// worth `whole` of the rate's second derivative, 1/s².
+pub fn easing_s(left: f64, whole_per_s2: f64) -> f64 {
+    if left >= 1.0 {
+        return 0.0;
+    }
+    let eased = |share: f64| (1.0 + 3.0 * EASED / share).acosh();
+    (eased(left.max(MIN_JERK_SHARE / 2.0)) - eased(1.0)) / (3.0 * whole_per_s2).sqrt()
+}
+
+/// First and third derivative of the polynomial `c` at `t`.
+fn derivatives(c: &[f64; 6], t: f64) -> (f64, f64) {
+    (
+        c[1] + t * (2.0 * c[2] + t * (3.0 * c[3] + t * (4.0 * c[4] + t * 5.0 * c[5]))),
+        6.0 * c[3] + t * (24.0 * c[4] + t * 60.0 * c[5]),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tandem_sdk::{AxisVector, SegmentFlags};
+
+    /// The limit of both axes, mm/s³.
+    const JERK: f64 = 20_000.0;
+
+    fn limits() -> Easing {
+        let mut easing = Easing::NONE;
+        easing.count(0, JERK);
+        easing.count(1, JERK);
+        easing
+    }
+
+    /// A piece of 1 ms of a circle of `radius` at `speed` that begins in the direction of the first axis.
+    fn turn(radius: f64, speed: f64) -> Segment {
+        let mut segment = Segment::rest(&AxisVector::ZERO, 0.001);
+        (segment.order, segment.flags) = (3, SegmentFlags::default());
+        segment.path[1] = speed;
+        segment.coefficients[0][1] = speed;
+        segment.coefficients[0][3] = -speed.powi(3) / (radius * radius) / 6.0;
+        segment.coefficients[1][2] = speed * speed / radius / 2.0;
+        segment
+    }
+
+    /// Time in which σ falls to 0.8 with all of the jerk that a plan leaves which uses the share `used` of it at σ = 1, s.
+    fn to_eased_s(used: f64, whole: f64) -> f64 {
+        let (step_s, mut time_s, mut sigma, mut rate) = (1e-6, 0.0, 1.0, 0.0);
+        while sigma > 1.0 - EASED {
+            let left = (1.0 - used * f64::powi(sigma, 3)).max(MIN_JERK_SHARE);
+            rate -= step_s * whole * left;
+            sigma += step_s * rate;
+            time_s += step_s;
+        }
+        time_s
+    }
+
+    #[test]
+    fn a_stop_begins_as_late_as_one_that_is_laid_out_step_by_step() {
+        for (radius, speed) in [(0.65, 20.0), (0.7, 20.0), (0.9, 20.0), (5.0, 80.0)] {
+            let (whole, used) = (JERK / speed, speed.powi(3) / (radius * radius) / JERK);
+            let expected = to_eased_s(used.min(1.0), whole) - to_eased_s(0.0, whole);
+            let easing = limits().longest_s(&turn(radius, speed));
+            assert!(
+                easing > 0.97 * expected && easing < 1.6 * expected + 0.002,
+                "{radius} mm at {speed} mm/s: {easing} s, not {expected} s"
+            );
+        }
+    }
+
+    #[test]
+    fn a_plan_that_goes_straight_on_or_brakes_itself_puts_no_stop_off() {
+        let straight = turn(1e9, 20.0);
+        assert!(limits().longest_s(&straight) < 1e-6);
+        let mut brakes = straight;
+        for c in [&mut brakes.coefficients[0], &mut brakes.path] {
+            c[3] = -JERK / 6.0;
+        }
+        assert_eq!(limits().longest_s(&brakes), 0.0);
+        let circle = Segment {
+            order: 2,
+            ..turn(0.6, 20.0)
+        };
+        assert_eq!(limits().longest_s(&circle), 0.0, "no jerk limit is kept");
+        assert_eq!(Easing::NONE.longest_s(&turn(0.6, 20.0)), 0.0);
+    }
+}
