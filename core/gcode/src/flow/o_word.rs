@@ -122,12 +122,7 @@ impl OWord {
             _ => {}
         }
         let start = scanner.at();
-        let word: String = scanner
-            .rest()
-            .iter()
-            .map_while(|b| b.is_ascii_alphabetic().then_some(*b as char))
-            .collect();
-        scanner.advance(word.len());
+        let word = keyword(&mut scanner);
         let keyword = Keyword::ALL
             .iter()
             .find(|(name, _)| name.eq_ignore_ascii_case(&word));
@@ -152,6 +147,24 @@ impl OWord {
             values_at: scanner.at() as u16,
         }))
     }
+}
+
+/// The letters that come next. Blanks among them do not count: `else if` is `elseif`.
+fn keyword(scanner: &mut Scanner) -> String {
+    let mut word = String::new();
+    let mut end = 0;
+    for (at, byte) in scanner.rest().iter().enumerate() {
+        match byte {
+            b' ' | b'\t' => {}
+            letter if letter.is_ascii_alphabetic() => {
+                word.push(*letter as char);
+                end = at + 1;
+            }
+            _ => break,
+        }
+    }
+    scanner.advance(end);
+    word
 }
 
 /// A label without a keyword.
@@ -270,6 +283,14 @@ mod tests {
         assert_eq!(
             read("o#<n> call"),
             Some((Label::Computed(1), Keyword::Call, 10))
+        );
+        assert_eq!(
+            read("o5 ELSE If [1]"),
+            Some((fixed("5"), Keyword::ElseIf, 10))
+        );
+        assert_eq!(
+            read("o5\tend\tif ;x"),
+            Some((fixed("5"), Keyword::EndIf, 9))
         );
         assert_eq!(read("O1234 (program)"), None);
         assert!(find(b"G1 O5", false).is_none() && find(b"/o1 if [1]", true).is_none());

@@ -7,13 +7,19 @@ pub(crate) const fn index(letter: u8) -> usize {
     (letter - b'A') as usize
 }
 
-/// The set of `letters` as a mask, bit 0 for A.
+/// The word `$`, which names a spindle, in a mask of letters.
+pub(crate) const SPINDLE_BIT: u32 = 1 << 26;
+
+/// The set of `letters` as a mask, bit 0 for A. `$` may be among them.
 pub(crate) const fn mask(letters: &str) -> u32 {
     let letters = letters.as_bytes();
     let mut mask = 0;
     let mut at = 0;
     while at < letters.len() {
-        mask |= 1 << index(letters[at]);
+        mask |= match letters[at] {
+            b'$' => SPINDLE_BIT,
+            letter => 1 << index(letter),
+        };
         at += 1;
     }
     mask

@@ -1,7 +1,7 @@
 //! The words of one line.
 
 use crate::line_error::{Checked, LineError, Span};
-use crate::state::letters::{AXIS_MASK, index, mask};
+use crate::state::letters::{AXIS_MASK, SPINDLE_BIT, index, mask};
 
 /// Most G words, and most M words, of a line.
 const MAX_CODES: usize = 16;
@@ -83,10 +83,12 @@ impl Polar {
 /// The words of one line. Kept from line to line so that nothing is allocated.
 #[derive(Clone, Default)]
 pub(crate) struct LineWords {
-    /// Bit per letter that the line has, G and M apart.
+    /// Bit per letter that the line has, G and M apart, and `SPINDLE_BIT`.
     pub present: u32,
     values: [f64; 26],
     spans: [Span; 26],
+    /// `$`.
+    spindle: Span,
     pub g: Codes,
     pub m: Codes,
     /// `@` and `^`.
@@ -134,6 +136,21 @@ impl LineWords {
             None => Ok(()),
             Some(_) => Err(twice(byte, span)),
         }
+    }
+
+    /// Adds `$`, which names the spindle that a word means. There is one: $0, and $-1 are all of them.
+    #[cold]
+    pub fn add_spindle(&mut self, value: f64, span: Span) -> Checked<()> {
+        if self.present & SPINDLE_BIT != 0 {
+            return Err(twice(b'$', span));
+        }
+        if value != 0.0 && value != -1.0 {
+            let message = "$ names a spindle, and this control has one: $0 ($-1 are all of them)";
+            return Err(LineError::new(span, "word-range", message));
+        }
+        self.present |= SPINDLE_BIT;
+        self.spindle = span;
+        Ok(())
     }
 
     /// Whether the line holds no word.
@@ -202,8 +219,10 @@ impl LineWords {
             return None;
         }
         let letters = (b'A'..=b'Z').filter(|l| present >> index(*l) & 1 != 0);
+        let spindle = (present & SPINDLE_BIT != 0).then_some((b'$', self.spindle));
         letters
             .map(|l| (l, self.span(l)))
+            .chain(spindle)
             .min_by_key(|(_, span)| span.start)
     }
 

@@ -33,6 +33,7 @@ pub(crate) fn parse(
             }
             byte @ (b'@' | b'^') => polar(byte, &mut scanner, context, words)?,
             b'#' => assignment(&mut scanner, context, words)?,
+            b'$' => spindle(&mut scanner, context, words)?,
             other => return Err(unexpected(other, scanner.here())),
         }
     }
@@ -70,6 +71,24 @@ fn word(
 /// `@` and `^`.
 #[cold]
 fn polar(byte: u8, scanner: &mut Scanner, context: &Context, words: &mut LineWords) -> Checked<()> {
+    let (value, span) = sign(byte, scanner, context)?;
+    words.add_polar(byte, value, span)
+}
+
+/// `$` with the number of a spindle.
+#[cold]
+fn spindle(scanner: &mut Scanner, context: &Context, words: &mut LineWords) -> Checked<()> {
+    let next = scanner.peek_at(1);
+    if next == b'$' || next.is_ascii_alphabetic() && words.is_empty() {
+        let message = "a command to grbl ($H, $X, $$) is no part of a program: whoever sends it says it to the controller";
+        return Err(LineError::new(scanner.here(), "unexpected", message));
+    }
+    let (value, span) = sign(b'$', scanner, context)?;
+    words.add_spindle(value, span)
+}
+
+/// The value and the place of a word that begins with a sign.
+fn sign(byte: u8, scanner: &mut Scanner, context: &Context) -> Checked<(f64, Span)> {
     let start = scanner.at();
     scanner.advance(1);
     scanner.skip_blanks();
@@ -80,7 +99,7 @@ fn polar(byte: u8, scanner: &mut Scanner, context: &Context, words: &mut LineWor
     if value.abs() > MAX_VALUE || value.is_nan() {
         return Err(too_large(byte, span));
     }
-    words.add_polar(byte, value, span)
+    Ok((value, span))
 }
 
 #[cold]

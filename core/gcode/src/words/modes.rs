@@ -44,7 +44,7 @@ pub(super) const WORDS: &[Word] = &[
     Word::new(
         "G95",
         Group::FeedMode,
-        "",
+        "$",
         "feed a revolution of the spindle; F is forgotten",
         Action::Act(feed_per_revolution),
         "G95 F0.1",

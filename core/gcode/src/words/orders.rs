@@ -3,12 +3,14 @@
 use super::{Action, GROUPS, Group, Shape, Word, written};
 use crate::line_error::{Checked, LineError, Span};
 use crate::state::MotionMode;
-use crate::state::letters::{AXIS_MASK, Letters, index, mask};
+use crate::state::letters::{AXIS_MASK, Letters, SPINDLE_BIT, index, mask};
 use crate::syntax::line_words::{Code, LineWords, Polar};
 
 /// Letters that any line may have.
 const ALWAYS: u32 = mask("NOFST");
 const ARC_LETTERS: u32 = mask("IJKR");
+/// Letters that several words of a line may take together.
+const SHARED: u32 = AXIS_MASK | SPINDLE_BIT;
 
 /// What a line orders.
 #[derive(Clone)]
@@ -90,7 +92,8 @@ impl Orders {
         let motion = self.choose_motion(words, modal, &mut claims, letters);
         g.and(m).and(motion)?;
         let foreign = words.present & AXIS_MASK & !letters.mask;
-        if words.present & (ALWAYS | claims.letters) != words.present || foreign != 0 {
+        let unused = words.present & !(ALWAYS | claims.letters);
+        if unused | foreign != 0 && !(unused | foreign == SPINDLE_BIT && words.has(b'S')) {
             return Err(misplaced(words, claims.letters, letters));
         }
         Ok(())
@@ -294,7 +297,7 @@ impl Claims {
     /// A letter that two words of the line could take belongs to neither: the author must split the line.
     #[inline]
     fn add(&mut self, word: &Word, words: &LineWords) -> Checked<()> {
-        let both = self.letters & word.mask & words.present & !AXIS_MASK;
+        let both = self.letters & word.mask & words.present & !SHARED;
         self.letters |= word.mask;
         if both == 0 {
             return Ok(());
@@ -381,6 +384,7 @@ fn takers(letter: u8) -> String {
         .iter()
         .filter(takes)
         .map(|word| word.code)
+        .chain((letter == b'$').then_some("S"))
         .collect::<Vec<_>>()
         .join(", ")
 }

@@ -34,7 +34,7 @@ pub(super) const WORDS: &[Word] = &[
     Word::new(
         "M51",
         Group::Override,
-        "P",
+        "P$",
         "spindle override on (P1) or off (P0)",
         by_p(SPINDLE),
         "M51 P0",

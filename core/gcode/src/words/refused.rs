@@ -5,6 +5,10 @@ use super::Word;
 
 const CYCLES: &str = "this canned cycle is not supported: let the CAM system write it out";
 const TURNING: &str = "turning cycles are not supported: let the CAM system write the passes out";
+/// Mach3 and Millmaster take the two for inches and millimetres.
+const TURNING_OR_INCHES: &str =
+    "turning cycles are not supported: let the CAM system write the passes out; inches are G20";
+const TURNING_OR_MILLIMETRES: &str = "turning cycles are not supported: let the CAM system write the passes out; millimetres are G21";
 const SYNCHRONOUS: &str = "motion synchronous with the spindle is not supported";
 const FRAMES: &str = "scaling, rotation, mirroring and polar coordinates are not supported";
 
@@ -58,8 +62,18 @@ pub(super) const WORDS: &[Word] = &[
     ),
     Word::refused("G68", Rotation, "rotation", FRAMES),
     Word::refused("G68.2", Rotation, "tilted plane", FRAMES),
-    Word::refused("G70", Motion, "finishing of a turned profile", TURNING),
-    Word::refused("G71", Motion, "roughing of a turned profile", TURNING),
+    Word::refused(
+        "G70",
+        Motion,
+        "finishing of a turned profile",
+        TURNING_OR_INCHES,
+    ),
+    Word::refused(
+        "G71",
+        Motion,
+        "roughing of a turned profile",
+        TURNING_OR_MILLIMETRES,
+    ),
     Word::refused("G71.1", Motion, "roughing of a turned profile", TURNING),
     Word::refused("G71.2", Motion, "roughing of a turned profile", TURNING),
     Word::refused("G72", Motion, "facing of a turned profile", TURNING),
@@ -79,5 +93,4 @@ pub(super) const WORDS: &[Word] = &[
         "rigid tapping mode",
         "motion synchronous with the spindle is not supported",
     ),
-    Word::refused("M60", Stop, "pallet change", "pallets are not supported"),
 ];

@@ -1,4 +1,4 @@
-//! M3, M4, M5, M19, G96, G97 and S: the spindle.
+//! M3, M4, M5, M19, G96, G97 and S: the spindle. There is one, so that `$0` says nothing new.
 
 use std::f64::consts::PI;
 
@@ -12,7 +12,7 @@ pub(super) const WORDS: &[Word] = &[
     Word::new(
         "M3",
         Group::Spindle,
-        "",
+        "$",
         "spindle clockwise",
         Action::Act(|line| turn(line, 1)),
         "S100 M3",
@@ -20,7 +20,7 @@ pub(super) const WORDS: &[Word] = &[
     Word::new(
         "M4",
         Group::Spindle,
-        "",
+        "$",
         "spindle counter-clockwise",
         Action::Act(|line| turn(line, -1)),
         "S100 M4",
@@ -28,7 +28,7 @@ pub(super) const WORDS: &[Word] = &[
     Word::new(
         "M5",
         Group::Spindle,
-        "",
+        "$",
         "spindle stop",
         Action::Act(|line| turn(line, 0)),
         "M5",
@@ -36,7 +36,7 @@ pub(super) const WORDS: &[Word] = &[
     Word::new(
         "M19",
         Group::Spindle,
-        "RQP",
+        "RQP$",
         "stop the spindle at the angle R in degrees; P the way round (0 the shorter), Q seconds at most",
         Action::Act(orient),
         "M19 R90",
@@ -44,7 +44,7 @@ pub(super) const WORDS: &[Word] = &[
     Word::new(
         "G96",
         Group::SpindleMode,
-        "D",
+        "D$",
         "S is the speed of the surface at X, in m/min (G21) or ft/min (G20); D rpm at most",
         Action::Act(surface_speed),
         "G96 D2000 S100",
@@ -52,7 +52,7 @@ pub(super) const WORDS: &[Word] = &[
     Word::new(
         "G97",
         Group::SpindleMode,
-        "",
+        "$",
         "S is in revolutions a minute",
         Action::Act(revolutions),
         "G97 S100",
@@ -270,6 +270,33 @@ mod tests {
                 "End",
             ],
         );
+    }
+
+    #[test]
+    fn a_dollar_names_the_one_spindle() {
+        assert_items(
+            "M3 $0 S60\nG97 S30 $#31 M3\nS60 $0\nM5 $-1",
+            &[
+                "1: Spindle 0 6.283 before 0",
+                "2: Spindle 0 3.142 before 0",
+                "3: Spindle 0 6.283 before 0",
+                "4: Spindle 0 0 before 0",
+                "End",
+            ],
+        );
+        for (wrong, code) in [
+            ("M3 $1 S60", "word-range"),
+            ("M3 $0 $0", "word-twice"),
+            ("M3 $", "value-missing"),
+            ("F1 $0", "unused-word"),
+            ("$0", "unused-word"),
+            ("G0 X1 $0", "unused-word"),
+            ("$H", "unexpected"),
+        ] {
+            let found = run_on(mill(), wrong).1;
+            let codes: Vec<_> = found.iter().map(|message| message.code).collect();
+            assert_eq!(codes, [code], "{wrong}");
+        }
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! M0, M1, M2 and M30: stops and the end of the program.
+//! M0, M1, M60, M2 and M30: stops and the end of the program.
 
 use tandem_sdk::EventKind;
 
@@ -23,6 +23,14 @@ pub(super) const WORDS: &[Word] = &[
         "stop where the optional stop is on",
         Action::Act(optional_stop),
         "M1",
+    ),
+    Word::new(
+        "M60",
+        Group::Stop,
+        "",
+        "stop for a change of pallets, until the operator resumes",
+        Action::Act(stop),
+        "M60",
     ),
     Word::new(
         "M2",
@@ -78,6 +86,20 @@ pub(crate) fn end(line: &mut Line) {
 #[cfg(test)]
 mod tests {
     use crate::testing::assert_items;
+
+    #[test]
+    fn a_change_of_pallets_is_a_stop() {
+        assert_items(
+            "F60 G1 X1\nM60\nX2",
+            &[
+                "1: Line 0 to 1 0 0 0 length 1 feed 1",
+                "2: Dwell 1 to 1 0 0 0 for 0",
+                "2: ProgramStop 0 0 before 2",
+                "3: Line 2 to 2 0 0 0 length 1 feed 1",
+                "End",
+            ],
+        );
+    }
 
     #[test]
     fn nothing_follows_the_end() {

@@ -154,7 +154,7 @@ refused.ngc:2:1: error: G33 (synchronous motion): motion synchronous with the sp
         (12, "G65"),
         (13, "G70"),
         (14, "G68"),
-        (15, "M60"),
+        (15, "G71"),
         (16, "M102"),
         (17, "G44"),
     ] {
