@@ -2,11 +2,14 @@
 
 use std::f64::consts::PI;
 
+use super::orders::Orders;
+use super::refused::TURNING;
 use super::{Action, Group, Word, nothing};
 use crate::config::Config;
 use crate::line::Line;
 use crate::line_error::{Checked, LineError, show};
-use crate::state::letters::Letters;
+use crate::state::letters::{Letters, mask};
+use crate::syntax::line_words::LineWords;
 
 pub(super) const WORDS: &[Word] = &[
     Word::new(
@@ -24,6 +27,22 @@ pub(super) const WORDS: &[Word] = &[
         "millimetres",
         Action::Act(millimetres),
         "G21",
+    ),
+    Word::new(
+        "G70",
+        Group::Units,
+        "",
+        "inches, as G20 (with P or Q it is the finishing of a turned profile, and refused)",
+        Action::Act(inches),
+        "G70",
+    ),
+    Word::new(
+        "G71",
+        Group::Units,
+        "",
+        "millimetres, as G21 (with P or Q it is the roughing of a turned profile, and refused)",
+        Action::Act(millimetres),
+        "G71",
     ),
     Word::new(
         "G93",
@@ -322,6 +341,17 @@ impl Modes {
     }
 }
 
+/// G70 and G71 alone are DIN 66025's words for units; on lathes they are cycles, which have one of these letters.
+#[cold]
+pub(super) fn turning_cycle(orders: &Orders, words: &LineWords) -> Option<LineError> {
+    let word = orders.get(Group::Units)?;
+    let (letter, _) = words.first_of(mask("DEIKPQR"))?;
+    matches!(word.code, "G70" | "G71").then(|| {
+        let message = format!("{} with {}: {TURNING}", word.code, letter as char);
+        orders.error(Group::Units, "refused", message)
+    })
+}
+
 fn inches(line: &mut Line) -> Checked<()> {
     line.state.modes.unit_mm = INCH_MM;
     Ok(())
@@ -437,7 +467,7 @@ fn refuse_time_constant(value_ms: f64, config: &Config) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use crate::testing::{blocks, last, short};
+    use crate::testing::{blocks, last, messages, short};
 
     #[test]
     fn the_time_constant_goes_with_its_block_and_the_following() {
@@ -476,6 +506,15 @@ mod tests {
             modes,
             expected.map(|(exact, tolerance)| (exact, tolerance.to_owned()))
         );
+    }
+
+    #[test]
+    fn units_in_the_words_of_din_66025() {
+        assert_eq!(short(last("G70\nG0 X1").end[0]), "25.4");
+        assert_eq!(short(last("G20\nG71\nG0 X1").end[0]), "1");
+        for wrong in ["G71 Q100", "G70 P10 Q20 U1", "G71 U2 R1", "G20 G71"] {
+            assert_eq!(messages(wrong).len(), 1, "{wrong}");
+        }
     }
 
     #[test]

@@ -94,7 +94,8 @@ impl Orders {
         let foreign = words.present & AXIS_MASK & !letters.mask;
         let unused = words.present & !(ALWAYS | claims.letters);
         if unused | foreign != 0 && !(unused | foreign == SPINDLE_BIT && words.has(b'S')) {
-            return Err(misplaced(words, claims.letters, letters));
+            return Err(super::modes::turning_cycle(self, words)
+                .unwrap_or_else(|| misplaced(words, claims.letters, letters)));
         }
         Ok(())
     }

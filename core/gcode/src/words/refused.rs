@@ -4,11 +4,8 @@ use super::Group::{Motion, NonModal, Plane, Polar, Rotation, Scaling, Spindle, S
 use super::Word;
 
 const CYCLES: &str = "this canned cycle is not supported: let the CAM system write it out";
-const TURNING: &str = "turning cycles are not supported: let the CAM system write the passes out";
-/// Mach3 and Millmaster take the two for inches and millimetres.
-const TURNING_OR_INCHES: &str =
-    "turning cycles are not supported: let the CAM system write the passes out; inches are G20";
-const TURNING_OR_MILLIMETRES: &str = "turning cycles are not supported: let the CAM system write the passes out; millimetres are G21";
+pub(super) const TURNING: &str =
+    "turning cycles are not supported: let the CAM system write the passes out";
 const SYNCHRONOUS: &str = "motion synchronous with the spindle is not supported";
 const FRAMES: &str = "scaling, rotation, mirroring and polar coordinates are not supported";
 
@@ -62,18 +59,6 @@ pub(super) const WORDS: &[Word] = &[
     ),
     Word::refused("G68", Rotation, "rotation", FRAMES),
     Word::refused("G68.2", Rotation, "tilted plane", FRAMES),
-    Word::refused(
-        "G70",
-        Motion,
-        "finishing of a turned profile",
-        TURNING_OR_INCHES,
-    ),
-    Word::refused(
-        "G71",
-        Motion,
-        "roughing of a turned profile",
-        TURNING_OR_MILLIMETRES,
-    ),
     Word::refused("G71.1", Motion, "roughing of a turned profile", TURNING),
     Word::refused("G71.2", Motion, "roughing of a turned profile", TURNING),
     Word::refused("G72", Motion, "facing of a turned profile", TURNING),
