@@ -73,3 +73,4 @@ mod trace;
 mod tune;
 mod walks;
 mod walks_draw;
+mod written_out;

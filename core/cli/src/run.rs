@@ -293,7 +293,7 @@ impl RunObserver for Sinks {
         if let Some(events) = &mut self.events {
             events.event(event);
         }
-        let Some(word) = stop_word(event.kind) else {
+        let Some(word) = stop_word(event) else {
             return;
         };
         let (line, switches) = (event.line, &self.switches);
@@ -368,8 +368,9 @@ impl Sinks {
 }
 
 /// The word of an event that waits for the operator.
-fn stop_word(kind: EventKind) -> Option<&'static str> {
-    match kind {
+fn stop_word(event: &Event) -> Option<&'static str> {
+    match event.kind {
+        EventKind::ProgramStop if event.index == 60 => Some("M60, change of pallets"),
         EventKind::ProgramStop => Some("M0, program stop"),
         EventKind::OptionalStop => Some("M1, optional stop"),
         EventKind::ToolChange => Some("M6, tool change"),

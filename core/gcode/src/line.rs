@@ -124,6 +124,8 @@ impl Line<'_> {
             self.state.motion = MotionMode::Refused;
         }
         if !complete {
+            // The words that were not read may have set the feed.
+            self.state.modes.suppose_feed();
             self.state.path.uncertain |= (1 << self.letters.count()) - 1;
         }
         if self.orders.axes_taken {

@@ -14,7 +14,7 @@ pub enum EventKind {
     ToolSelect = 3,
     /// The selected tool is changed in (M6): `index` is its number.
     ToolChange = 4,
-    /// M0: wait for the operator.
+    /// M0, or M60 where `index` is 60: wait for the operator.
     ProgramStop = 5,
     /// M1: wait for the operator where the optional stop is on.
     OptionalStop = 6,

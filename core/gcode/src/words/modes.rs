@@ -327,6 +327,18 @@ impl Modes {
         };
     }
 
+    /// Some feed where there is none, so that no later line is blamed for one that could not be read.
+    pub fn suppose_feed(&mut self) {
+        if self.feed
+            == (Feed {
+                mode: self.feed.mode,
+                ..Feed::default()
+            })
+        {
+            self.set_feed(60.0);
+        }
+    }
+
     /// F. With G93 it holds for its line only, which reads it itself.
     #[inline]
     fn set_feed(&mut self, feed: f64) {

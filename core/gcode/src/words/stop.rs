@@ -29,7 +29,7 @@ pub(super) const WORDS: &[Word] = &[
         Group::Stop,
         "",
         "stop for a change of pallets, until the operator resumes",
-        Action::Act(stop),
+        Action::Act(pallets),
         "M60",
     ),
     Word::new(
@@ -53,6 +53,12 @@ pub(super) const WORDS: &[Word] = &[
 fn stop(line: &mut Line) -> Checked<()> {
     line.rest();
     line.event(EventKind::ProgramStop, 0, 0.0);
+    Ok(())
+}
+
+fn pallets(line: &mut Line) -> Checked<()> {
+    line.rest();
+    line.event(EventKind::ProgramStop, 60, 0.0);
     Ok(())
 }
 
@@ -94,7 +100,7 @@ mod tests {
             &[
                 "1: Line 0 to 1 0 0 0 length 1 feed 1",
                 "2: Dwell 1 to 1 0 0 0 for 0",
-                "2: ProgramStop 0 0 before 2",
+                "2: ProgramStop 60 0 before 2",
                 "3: Line 2 to 2 0 0 0 length 1 feed 1",
                 "End",
             ],

@@ -380,6 +380,14 @@ fn one_error_does_not_cause_others() {
             "1:12 [unused-word] nothing in this line takes the word Q (G5, G6.2, G10, G64, G73, G83, M19, M61, M66, M67, M68, M100 would)",
         ],
     );
+    // A feed that cannot be read is not missed in each line that needs one.
+    assert_messages(
+        "F#<_hal[a]>\nG1 X1\nX2\nG94\nX3",
+        &[
+            "1:2 [parameter-unset] parameter #<_hal[a]> would read a HAL pin, and there is no HAL: M66 reads inputs",
+            "5:1 [feed-missing] the feed is missing: no F has been set; G1, G2 and G3 need one",
+        ],
+    );
     assert_messages(
         "#<a>=[1/0]\nG0 X#<a>",
         &["1:7 [arithmetic] division by zero"],
