@@ -43,6 +43,8 @@ pub struct Client {
     looked_at: usize,
     /// Whole lines wait in it for the next round.
     owes: bool,
+    /// The system was asked, and has nothing of it: reading would find nothing.
+    is_quiet: bool,
     hearing: Hearing,
     outbox: Outbox,
     session: Box<dyn Talk>,
@@ -92,6 +94,7 @@ impl Client {
             incoming: vec![],
             looked_at: 0,
             owes: false,
+            is_quiet: false,
             hearing: Hearing::Speaks,
             outbox,
             session,
@@ -144,6 +147,13 @@ impl Client {
         flags.set(PollFlags::IN, reads);
         flags.set(PollFlags::OUT, !self.outbox.is_empty());
         (self.stream.as_ref(), flags)
+    }
+
+    /// What the system said of its socket when it was asked for that which [`Client::interest`] names; `None` where nobody asked.
+    pub fn hears(&mut self, said: Option<PollFlags>) {
+        let asked = self.interest().1.contains(PollFlags::IN);
+        self.is_quiet =
+            asked && said.is_some_and(|said| said.difference(PollFlags::OUT).is_empty());
     }
 
     /// When it is to be looked at again, though it says nothing: its next status line, or lines that wait.
@@ -265,6 +275,9 @@ impl Client {
             } else if !self.session.is_busy() {
                 self.hearing = Hearing::Parts;
             }
+            return;
+        }
+        if std::mem::take(&mut self.is_quiet) {
             return;
         }
         let mut chunk = [0; CHUNK];

@@ -90,6 +90,10 @@ struct Room {
     doors: Vec<Door>,
     /// Until when nobody is let in at each door: the system refuses to.
     shut_until: Vec<Option<Instant>>,
+    /// Whether nobody waits at each door, by the system's word.
+    nobody_waits: Vec<bool>,
+    /// Whether the bell has not rung, likewise.
+    bell_is_still: bool,
     clients: Vec<Client>,
     lease: Lease,
     /// Clients that ever came.
@@ -100,11 +104,12 @@ struct Room {
 
 impl Room {
     fn new(house: Arc<dyn House>, doors: Vec<Door>) -> Self {
-        let shut_until = doors.iter().map(|_| None).collect();
         Self {
             house,
+            shut_until: vec![None; doors.len()],
+            nobody_waits: vec![false; doors.len()],
+            bell_is_still: false,
             doors,
-            shut_until,
             clients: vec![],
             lease: Lease::default(),
             comers: 0,
@@ -131,7 +136,10 @@ impl Room {
     /// Serves each client once.
     fn round(&mut self, now: Instant) {
         for at in 0..self.clients.len() {
-            let has_place = has_place(&self.clients, self.clients[at].door, Standing::Owner);
+            let client = &self.clients[at];
+            // Who is known needs none, and has one.
+            let has_place = client.standing() != Standing::Stranger
+                || has_place(&self.clients, client.door, Standing::Owner);
             self.guarded(at, now, |client, lease| client.serve(lease, has_place, now));
         }
         self.show_status(now);
@@ -190,7 +198,8 @@ impl Room {
 
     /// Hands out what nobody has asked for in this moment.
     fn deliver(&mut self, now: Instant) {
-        if let Some(mut bell) = self.house.bell() {
+        let is_still = std::mem::take(&mut self.bell_is_still);
+        if let Some(mut bell) = self.house.bell().filter(|_| !is_still) {
             // What rang does not matter.
             let _ = std::io::Read::read(&mut bell, &mut [0; 64]);
         }
@@ -221,6 +230,9 @@ impl Room {
                 continue;
             }
             self.shut_until[at] = None;
+            if std::mem::take(&mut self.nobody_waits[at]) {
+                continue;
+            }
             for _ in 0..MAX_COMERS {
                 if door.asks_for_token() && !make_place_for_stranger(&mut self.clients, at, now) {
                     self.shut_until[at] = Some(now + DOOR_REST);
@@ -254,20 +266,30 @@ impl Room {
         }
     }
 
-    /// Sleeps until somebody comes, says something, can be told something or is due a status line.
-    fn sleep(&self, most: Duration) {
+    /// Sleeps until somebody comes, says something, can be told something or is due a status line. Who has said nothing is not asked
+    /// in the round that follows: of sixteen who look on, one is served in most rounds, and reading of the others takes longer than
+    /// serving it.
+    fn sleep(&mut self, most: Duration) {
         let now = Instant::now();
         let due = self.clients.iter().filter_map(Client::due).min();
         let doors_due = self.shut_until.iter().flatten().min();
         let due = [due, doors_due.copied()].into_iter().flatten().min();
         let sleep = due.map_or(most, |due| due.saturating_duration_since(now).min(most));
-        let open = self
+        let is_asked =
+            |(door, shut): (&Door, &Option<Instant>)| shut.is_none() && door.fd().is_some();
+        let doors_asked: Vec<bool> = self
             .doors
             .iter()
             .zip(&self.shut_until)
-            .filter(|(_, shut)| shut.is_none());
+            .map(is_asked)
+            .collect();
+        let doors = self
+            .doors
+            .iter()
+            .zip(&doors_asked)
+            .filter(|(_, is_asked)| **is_asked);
         let doors =
-            open.filter_map(|(door, _)| Some(PollFd::from_borrowed_fd(door.fd()?, PollFlags::IN)));
+            doors.filter_map(|(door, _)| Some(PollFd::from_borrowed_fd(door.fd()?, PollFlags::IN)));
         let clients = self.clients.iter().map(|client| {
             let (stream, flags) = client.interest();
             PollFd::from_borrowed_fd(stream.fd(), flags)
@@ -281,8 +303,21 @@ impl Room {
             tv_sec: 0,
             tv_nsec: i64::from(sleep.subsec_nanos()),
         };
-        // A signal ends the sleep early: a round more does no harm.
-        let _ = poll(&mut all, Some(&timeout));
+        // A signal ends the sleep early: then nothing was said of anybody, and the round asks all of them.
+        let is_told = poll(&mut all, Some(&timeout)).is_ok();
+        let said: Vec<PollFlags> = all
+            .iter()
+            .filter(|_| is_told)
+            .map(PollFd::revents)
+            .collect();
+        let mut said = said.into_iter();
+        for (nobody_waits, is_asked) in self.nobody_waits.iter_mut().zip(doors_asked) {
+            *nobody_waits = is_asked && said.next().is_some_and(|said| said.is_empty());
+        }
+        for client in &mut self.clients {
+            client.hears(said.next());
+        }
+        self.bell_is_still = said.next().is_some_and(|said| said.is_empty());
     }
 
     /// The run is over: everybody is told, and has a moment to read it.
@@ -290,6 +325,9 @@ impl Room {
         self.doors.clear();
         let start = Instant::now();
         // What was said until now comes before the farewell.
+        self.clients
+            .iter_mut()
+            .for_each(|client| client.hears(None));
         self.round(start);
         for client in &mut self.clients {
             client.dismiss(start);

@@ -4,6 +4,8 @@ use std::io::{self, BufRead, BufReader, Read, Write};
 use std::os::fd::{AsFd, BorrowedFd};
 use std::os::unix::net::UnixStream;
 use std::path::Path;
+use std::sync::atomic::AtomicUsize;
+use std::sync::atomic::Ordering::Relaxed;
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
@@ -12,16 +14,17 @@ use tandem_machine::Machine;
 use super::*;
 use crate::operator::listen::Stream;
 
-/// A client whose handling panics.
-struct Defective(UnixStream);
+/// A client in whose reading something is done first.
+struct WhenRead<F>(UnixStream, F);
 
-impl Read for Defective {
-    fn read(&mut self, _: &mut [u8]) -> io::Result<usize> {
-        panic!("a defect in the handling of a client, on purpose")
+impl<F: FnMut()> Read for WhenRead<F> {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        (self.1)();
+        self.0.read(bytes)
     }
 }
 
-impl Write for Defective {
+impl<F> Write for WhenRead<F> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.0.write(bytes)
     }
@@ -31,12 +34,14 @@ impl Write for Defective {
     }
 }
 
-impl Stream for Defective {
+impl<F: FnMut() + Send> Stream for WhenRead<F> {
     fn fd(&self) -> BorrowedFd<'_> {
         self.0.as_fd()
     }
 
-    fn end_writing(&self) {}
+    fn end_writing(&self) {
+        let _ = self.0.shutdown(std::net::Shutdown::Write);
+    }
 }
 
 fn room() -> Room {
@@ -90,7 +95,8 @@ fn a_panic_in_the_handling_of_a_client_ends_that_client_and_no_other() {
     let (mut room, now) = (room(), Instant::now());
     let (ours, theirs) = UnixStream::pair().unwrap();
     let mut friend = room.friend(now);
-    room.comes(Box::new(Defective(ours)), None, now);
+    let defect = || panic!("a defect in the handling of a client, on purpose");
+    room.comes(Box::new(WhenRead(ours, defect)), None, now);
     room.lease.take(2, now).unwrap();
     assert!(room.ask(&mut friend, r#"{"command":"hold"}"#, now)["ok"].is_object());
     assert_eq!(hear(&mut BufReader::new(theirs))["error"]["what"], "failed");
@@ -187,4 +193,45 @@ fn whoever_asks_is_answered_before_the_status_lines_of_all_the_others() {
         assert!(hear(watcher)["ok"].is_object());
         assert_eq!(hear(watcher)["lost"], 0);
     }
+}
+
+/// Most who look on say nothing for hours, and one of them is told something nearly every millisecond.
+#[test]
+fn whoever_says_nothing_is_not_read_in_a_round_and_whoever_hangs_up_is_noticed_at_once() {
+    let (mut room, now) = (room(), Instant::now());
+    let reads = Arc::new(AtomicUsize::new(0));
+    let mut silent: Vec<_> = (0..15)
+        .map(|_| {
+            let (ours, theirs) = UnixStream::pair().unwrap();
+            ours.set_nonblocking(true).unwrap();
+            let reads = Arc::clone(&reads);
+            let count = move || _ = reads.fetch_add(1, Relaxed);
+            room.comes(Box::new(WhenRead(ours, count)), None, now);
+            theirs
+        })
+        .collect();
+    let mut friend = room.friend(now);
+    for _ in 0..10 {
+        writeln!(friend.get_mut(), r#"{{"status":{{}}}}"#).unwrap();
+        room.sleep(LONGEST_SLEEP);
+        room.round(now);
+        assert!(hear(&mut friend)["ok"].is_object());
+    }
+    assert_eq!(reads.load(Relaxed), 0);
+    drop(silent.pop());
+    room.sleep(LONGEST_SLEEP);
+    room.round(now);
+    room.round(now);
+    assert_eq!(room.clients.len(), 15, "who has gone is gone");
+    // What one says just before the end is heard, though the system was asked before it.
+    room.sleep(Duration::ZERO);
+    let mut last = silent.remove(0);
+    writeln!(last, r#"{{"command":"hold"}}"#).unwrap();
+    last.shutdown(std::net::Shutdown::Write).unwrap();
+    drop((silent, friend));
+    room.farewell();
+    drop(room);
+    let mut said = String::new();
+    last.read_to_string(&mut said).unwrap();
+    assert!(said.starts_with(r#"{"ok":{"command":"hold""#), "{said}");
 }
