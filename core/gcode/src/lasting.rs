@@ -61,6 +61,21 @@ impl Default for Lasting {
     }
 }
 
+/// What is in force of the tables of [`Lasting`], by itself: for whoever shows it many times a second.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InForce {
+    /// Index of the work coordinate system: 0 for G54.
+    pub system: usize,
+    /// Its origin.
+    pub origin: AxisVector,
+    /// Offset of G92.
+    pub g92: AxisVector,
+    /// Tool length offset (G43).
+    pub tool_offset: AxisVector,
+    /// Tool in the spindle, 0 for none.
+    pub tool_in_spindle: u32,
+}
+
 /// Modes, offsets, tools and parameters as they are from a place of the path on.
 #[derive(Clone)]
 pub struct Moment {
@@ -142,6 +157,18 @@ impl Interpreter {
         lasting.tools.clone_from(self.state.tools.table());
         lasting.tool_in_spindle = self.state.tools.in_spindle;
         lasting
+    }
+
+    /// What is in force of it now. Does not allocate.
+    pub fn in_force(&self) -> InForce {
+        let coordinates = &self.state.coordinates;
+        InForce {
+            system: coordinates.active(),
+            origin: *coordinates.origin(coordinates.active()),
+            g92: *coordinates.g92(),
+            tool_offset: *coordinates.tool(),
+            tool_in_spindle: self.state.tools.in_spindle,
+        }
     }
 
     /// Takes offsets, parameters and tools as they are said here; modes stay. At rest; allocates.

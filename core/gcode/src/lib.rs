@@ -67,7 +67,7 @@ pub use config::{
 pub use diagnostic::{Diagnostic, Severity, Sketch};
 pub use interpreter::{Interpreter, MAX_LINE_BYTES};
 pub use item::{Input, InputMode, InputWait, Item, ProbeResult, UserCommand};
-pub use lasting::{Lasting, Ledger, Moment, SwitchedOn, WORK_SYSTEMS, system_code};
+pub use lasting::{InForce, Lasting, Ledger, Moment, SwitchedOn, WORK_SYSTEMS, system_code};
 pub use program::{Program, ProgramError};
 pub use stated::Watched;
 pub use stream::Stream;

@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use serde::Serialize;
 use serde_json::{Value, json};
 use tandem_machine::Machine;
 use tandem_recorder::rpm;
@@ -209,6 +210,14 @@ pub struct Frame {
     pub text: String,
 }
 
+/// What a frame says.
+#[derive(Serialize)]
+struct Rows<'a> {
+    tick: u64,
+    every: u64,
+    rows: Vec<&'a [f64]>,
+}
+
 impl Scope {
     /// Nobody looks.
     pub fn new(machine: &Machine) -> Self {
@@ -411,12 +420,16 @@ impl Scope {
             }
             live.age = 0;
             let rows: Vec<_> = live.rows.chunks(live.signals.len()).collect();
-            let frame = json!({ "tick": live.tick, "every": live.every, "rows": rows });
-            let text = frame.to_string();
+            let frame = Rows {
+                tick: live.tick,
+                every: live.every,
+                rows,
+            };
+            let text = serde_json::to_string(&frame).unwrap_or_default();
             frames.push(Frame {
                 client: live.client,
                 // Behind the brace: the number of lost frames comes before it.
-                text: text[1..].to_string(),
+                text: text.get(1..).unwrap_or_default().to_string(),
             });
             live.rows.clear();
         }

@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Instant;
 
+use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use super::clerk::Clerk;
@@ -325,6 +326,11 @@ impl Protocol2 {
 }
 
 impl Subscription {
+    /// Whether less than everything is told.
+    fn picks(&self) -> bool {
+        self.changes || !self.fields.is_empty()
+    }
+
     /// What of `status` is told now.
     fn pick(&mut self, status: Value) -> Value {
         let Value::Object(mut all) = status else {
@@ -444,15 +450,10 @@ impl Talk for Protocol2 {
     }
 
     fn telemetry(&mut self, lost: u64) -> String {
-        let status = self.desk.status();
-        let told = match &mut self.subscription {
-            Some(of) => of.pick(status),
-            None => status,
-        };
-        format!(
-            "{}\n",
-            json!({ "event": "status", "lost": lost, "status": told })
-        )
+        match &mut self.subscription {
+            Some(of) if of.picks() => status_line(lost, &of.pick(self.desk.status())),
+            _ => status_line(lost, &self.desk.shown()),
+        }
     }
 
     fn ended(&self, _lost: u64) -> String {
@@ -478,6 +479,23 @@ impl Talk for Protocol2 {
 /// Whether the keys of a request are as its table says.
 fn check(asked: &Asked) -> Result<(), String> {
     word_of(&asked.request).map_or(Ok(()), |word| word.check(&asked.with))
+}
+
+/// A status line that was subscribed to, behind so many that were lost.
+fn status_line(lost: u64, status: &impl Serialize) -> String {
+    #[derive(Serialize)]
+    struct Line<'a, S> {
+        event: &'static str,
+        lost: u64,
+        status: &'a S,
+    }
+    let line = Line {
+        event: "status",
+        lost,
+        status,
+    };
+    // What is told has neither a map with other keys than words nor anything else that is no JSON.
+    serde_json::to_string(&line).unwrap_or_default() + "\n"
 }
 
 /// A frame of the scope as a line, behind so many that were lost.
