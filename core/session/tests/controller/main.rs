@@ -3,6 +3,7 @@
 mod doors;
 mod every_state;
 mod homing;
+mod onlookers;
 mod page;
 mod queued;
 mod scale;
