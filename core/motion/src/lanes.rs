@@ -8,14 +8,10 @@
 /// One number a lane.
 pub type Lanes<const L: usize> = [f64; L];
 
-/// Calls `f` for every lane.
+/// Calls `f` for every lane. Not a loop: what is summed up lane by lane stays in registers then, and does not go through memory.
 #[inline(always)]
-pub fn each<const L: usize>(mut f: impl FnMut(usize) -> f64) -> Lanes<L> {
-    let mut out = [0.0; L];
-    for (lane, value) in out.iter_mut().enumerate() {
-        *value = f(lane);
-    }
-    out
+pub fn each<const L: usize>(f: impl FnMut(usize) -> f64) -> Lanes<L> {
+    std::array::from_fn(f)
 }
 
 /// The larger one; the first where either is no number. Unlike `f64::max` one instruction.
@@ -31,7 +27,7 @@ pub fn smaller(a: f64, b: f64) -> f64 {
 }
 
 /// The largest of all lanes.
-#[inline]
+#[inline(always)]
 pub fn largest<const L: usize>(values: &Lanes<L>) -> f64 {
     values
         .iter()

@@ -65,9 +65,11 @@ struct Looker<'a, const L: usize> {
 }
 
 impl<const L: usize> Looker<'_, L> {
+    /// The direction at `s`. Where it was last looked for is `near`, and where it is found afterwards.
     #[inline(always)]
-    fn direction_at(&self, s: f64) -> &Lanes<L> {
-        &self.chords[chord_at(self.chords, s, self.at)].direction
+    fn direction_at(&self, s: f64, near: &mut usize) -> &Lanes<L> {
+        *near = chord_at(self.chords, s, *near);
+        &self.chords[*near].direction
     }
 
     /// The direction here: at a vertex the mean.
@@ -92,10 +94,11 @@ fn cap<const L: usize>(
 ) -> f64 {
     let here = looker.here(s);
     let mut v = most;
+    let [mut behind, mut before] = [looker.at; 2];
     for _ in 0..80 {
         let way = v * corner_s;
-        let from = looker.direction_at(s - way);
-        let to = looker.direction_at(s + way);
+        let from = looker.direction_at(s - way, &mut behind);
+        let to = looker.direction_at(s + way, &mut before);
         let mut fits = true;
         for l in 0..L {
             let bend = (from[l] - 2.0 * here[l] + to[l]).abs();

@@ -106,6 +106,8 @@ pub struct Window<const L: usize> {
     pub stop: Stop,
     /// Where marks were last looked for: the next question is about a place near it.
     near: Cell<usize>,
+    /// The piece that was last found: the next question is mostly about it, or the one behind it.
+    found: Cell<usize>,
 }
 
 /// Marks that are looked at beside the last ones before all are searched.
@@ -153,6 +155,7 @@ impl<const L: usize> Window<L> {
             whole: false,
             stop: Stop::default(),
             near: Cell::new(0),
+            found: Cell::new(0),
         }
     }
 
@@ -184,10 +187,16 @@ impl<const L: usize> Window<L> {
 
     /// The piece at `t`: the later one at a border.
     pub fn piece_at(&self, t: f64) -> usize {
-        self.pieces
-            .partition_point(|piece| piece.start_s <= t)
-            .max(1)
-            - 1
+        let begun = |k: usize| self.pieces.get(k).is_some_and(|piece| piece.start_s <= t);
+        let last = self.found.get();
+        let near = if begun(last + 1) { last + 1 } else { last };
+        if !begun(near) || begun(near + 1) {
+            let all_begun = self.pieces.partition_point(|piece| piece.start_s <= t);
+            self.found.set(all_begun.max(1) - 1);
+        } else {
+            self.found.set(near);
+        }
+        self.found.get()
     }
 
     /// Position, velocity and acceleration at `t`.
@@ -250,6 +259,23 @@ mod tests {
                     window.marks.partition_point(|mark| mark.t <= place),
                     "{near} {place}"
                 );
+            }
+        }
+    }
+
+    #[test]
+    fn a_piece_is_found_from_whichever_was_found_last() {
+        let mut window = Window::<2>::new();
+        let rest = [[0.0; 2]; 3];
+        window.pieces = (0..20)
+            .map(|n| Piece::between(&rest, &rest, f64::from(n / 2), 1.0))
+            .collect();
+        for last in 0..25 {
+            for half in -2..24 {
+                let t = f64::from(half) / 2.0;
+                window.found.set(last);
+                let begun = window.pieces.iter().filter(|piece| piece.start_s <= t);
+                assert_eq!(window.piece_at(t), begun.count().max(1) - 1, "{last} {t}");
             }
         }
     }

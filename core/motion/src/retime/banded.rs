@@ -16,31 +16,42 @@ impl Pentadiagonal {
 
     /// Replaces the matrix by its factors `L·D·Lᵀ`, and `right` by the solution. Does not allocate.
     pub fn solve(&mut self, right: &mut [f64]) {
-        let size = self.rows.len();
+        let size = self.rows.len().min(right.len());
+        let (rows, right) = (&mut self.rows[..size], &mut right[..size]);
+        let Some((mut here, mut value)) = rows.first().copied().zip(right.first().copied()) else {
+            return;
+        };
+        // A row is written once, as each waits for the one before: what rows before have taken of the next one is carried on.
+        let mut next = rows.get(1).map_or(0.0, |row| row[0]);
+        let mut next_value = right.get(1).copied().unwrap_or(0.0);
         for i in 0..size {
-            let [d, e, f] = self.rows[i];
+            let [d, e, f] = here;
             let l1 = e / d;
             let l2 = f / d;
+            rows[i] = [d, l1, l2];
+            right[i] = value;
             if i + 1 < size {
-                self.rows[i + 1][0] -= l1 * e;
-                self.rows[i + 1][1] -= l1 * f;
-                right[i + 1] -= l1 * right[i];
+                let [_, e_below, f_below] = rows[i + 1];
+                here = [next - l1 * e, e_below - l1 * f, f_below];
+                let below = next_value - l1 * value;
+                if i + 2 < size {
+                    next = rows[i + 2][0] - l2 * f;
+                    next_value = right[i + 2] - l2 * value;
+                }
+                value = below;
             }
-            if i + 2 < size {
-                self.rows[i + 2][0] -= l2 * f;
-                right[i + 2] -= l2 * right[i];
-            }
-            self.rows[i] = [d, l1, l2];
         }
+        let [mut after, mut after_next] = [0.0; 2];
         for i in (0..size).rev() {
-            let [d, l1, l2] = self.rows[i];
+            let [d, l1, l2] = rows[i];
             let mut value = right[i] / d;
             if i + 1 < size {
-                value -= l1 * right[i + 1];
+                value -= l1 * after;
             }
             if i + 2 < size {
-                value -= l2 * right[i + 2];
+                value -= l2 * after_next;
             }
+            (after, after_next) = (value, after);
             right[i] = value;
         }
     }

@@ -631,7 +631,9 @@ impl Reach {
             each(|i| larger(self.multiplier[i], 1.0 - shrinking[i] - target * inverse[i]));
     }
 
-    /// Lengths of the step of slacks and of multipliers.
+    /// Lengths of the step of slacks and of multipliers. Were it called, what is reached would be kept in memory for that, and each
+    /// row would wait for the row before to be written there.
+    #[inline(always)]
     fn lengths(&self) -> (f64, f64) {
         let length = |most: &Wide| smaller(1.0, BOUNDARY / larger(largest(most), 1e-9));
         (length(&self.slack), length(&self.multiplier))

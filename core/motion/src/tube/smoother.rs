@@ -140,9 +140,9 @@ impl<const L: usize> Smoother<L> {
             }
             let free = 3..spline.points.len() - 3;
             banded::solve(&mut self.matrix[free.clone()], &mut self.step[free]);
-            let length = self.advance(spline, &target);
+            let length;
+            (length, gap) = self.advance(spline, &target);
             shrink = each(|l| if length[l] > 0.8 { 0.03 } else { 0.4 });
-            gap = self.gap();
             status.iterations += 1;
         }
     }
@@ -185,6 +185,12 @@ impl<const L: usize> Smoother<L> {
                 sum = each(|l| sum[l] + row.slack[n][l] * row.multiplier[n][l]);
             }
         }
+        self.mean(&sum)
+    }
+
+    /// The mean of what has this `sum` over all rows.
+    #[inline(always)]
+    fn mean(&self, sum: &Lanes<L>) -> Lanes<L> {
         let per = 0.5 / self.rows.len().max(1) as f64;
         each(|l| sum[l] * per)
     }
@@ -223,15 +229,15 @@ impl<const L: usize> Smoother<L> {
             }
             let weight: Lanes<L> = each(|l| weight[l] * row.per_half[l] * row.per_half[l]);
             let slope: Lanes<L> = each(|l| slope[l] * row.per_half[l]);
+            let (rows, steps) = system(&mut self.matrix, &mut self.step, row.interval);
             for i in 0..4 {
-                let at = row.interval + i;
                 let wi = row.weights[i];
                 for j in i..4 {
-                    let entry = &mut self.matrix[at][j - i];
+                    let entry = &mut rows[i][j - i];
                     let w = wi * row.weights[j];
                     *entry = each(|l| entry[l] + w * weight[l]);
                 }
-                let entry = &mut self.step[at];
+                let entry = &mut steps[i];
                 *entry = each(|l| entry[l] - wi * slope[l]);
             }
         }
@@ -251,19 +257,21 @@ impl<const L: usize> Smoother<L> {
             let over = larger(jerk[l] - HINGE, 0.0) + smaller(jerk[l] + HINGE, 0.0);
             (GENTLE * jerk[l] + weight * over) * scale[l]
         });
+        let (rows, steps) = system(&mut self.matrix, &mut self.step, k);
         for i in 0..4 {
             for j in i..4 {
-                let entry = &mut self.matrix[k + i][j - i];
+                let entry = &mut rows[i][j - i];
                 *entry = each(|l| entry[l] + D[i] * D[j] * bend[l]);
             }
-            let entry = &mut self.step[k + i];
+            let entry = &mut steps[i];
             *entry = each(|l| entry[l] - D[i] * slope[l]);
         }
     }
 
-    /// Goes along the step as far as slacks and multipliers stay positive, lane by lane; gives the primal lengths.
+    /// Goes along the step as far as slacks and multipliers stay positive, lane by lane; gives the primal lengths, and the
+    /// complementarity behind it.
     #[inline(always)]
-    fn advance(&mut self, spline: &mut Spline<L>, target: &Lanes<L>) -> Lanes<L> {
+    fn advance(&mut self, spline: &mut Spline<L>, target: &Lanes<L>) -> (Lanes<L>, Lanes<L>) {
         let count = spline.points.len();
         self.step[..3].fill([0.0; L]);
         self.step[count - 3..].fill([0.0; L]);
@@ -289,26 +297,41 @@ impl<const L: usize> Smoother<L> {
         }
         let length: Lanes<L> = each(|l| smaller(1.0, BOUNDARY / larger(most[l], 1e-9)));
         let back: Lanes<L> = each(|l| smaller(1.0, BOUNDARY / larger(max_back[l], 1e-9)));
+        let mut products = [0.0; L];
         for row in &mut self.rows {
             for n in 0..2 {
                 let slack = row.slack[n];
                 let multiplier = row.multiplier[n];
                 let change = row.residual[n];
-                row.slack[n] = each(|l| slack[l] + length[l] * change[l]);
+                let new_slack: Lanes<L> = each(|l| slack[l] + length[l] * change[l]);
                 let inverse = &row.inverse[n];
                 // Δλ = (target − λ·(s + Δs))/s.
-                row.multiplier[n] = each(|l| {
+                let new_multiplier: Lanes<L> = each(|l| {
                     let per_slack = multiplier[l] * inverse[l];
                     multiplier[l]
                         + back[l] * (target[l] - multiplier[l] * (slack[l] + change[l])) * per_slack
                 });
+                products = each(|l| products[l] + new_slack[l] * new_multiplier[l]);
+                (row.slack[n], row.multiplier[n]) = (new_slack, new_multiplier);
             }
         }
         for (point, step) in spline.points.iter_mut().zip(&self.step) {
             *point = each(|l| point[l] + length[l] * step[l]);
         }
-        length
+        (length, self.mean(&products))
     }
+}
+
+/// The rows of the control points of interval `k`, and their right sides.
+#[inline(always)]
+fn system<'a, const L: usize>(
+    matrix: &'a mut [Row<L>],
+    step: &'a mut [Lanes<L>],
+    k: usize,
+) -> (&'a mut [Row<L>; 4], &'a mut [Lanes<L>; 4]) {
+    let rows = matrix[k..].first_chunk_mut();
+    let steps = step[k..].first_chunk_mut();
+    rows.zip(steps).expect("four control points")
 }
 
 #[inline(always)]
