@@ -22,6 +22,8 @@ pub struct PeriodPoints {
     per_acceleration: [f64; MAX_AXES],
     per_speed: [[f64; MAX_AXES]; 2],
     axes: usize,
+    /// The points themselves are kept, and not only what they are of the limits.
+    keeps_points: bool,
     /// Largest |velocity| / limit.
     pub speed_ratio: f64,
     /// Largest |acceleration| / limit.
@@ -38,6 +40,7 @@ impl PeriodPoints {
         let list = vec![PeriodPoint::default(); Self::POINTS].into_boxed_slice();
         Self {
             list,
+            keeps_points: true,
             count: 0,
             per_acceleration: limits.map(|l| 1.0 / l.acceleration_mm_per_s2),
             per_speed: [
@@ -48,6 +51,14 @@ impl PeriodPoints {
             speed_ratio: 0.0,
             acceleration_ratio: 0.0,
             covered_s: 0.0,
+        }
+    }
+
+    /// Nobody looks at the points themselves, where jerk is limited too.
+    pub fn without_points(self) -> Self {
+        Self {
+            keeps_points: false,
+            ..self
         }
     }
 
@@ -95,38 +106,63 @@ impl PeriodPoints {
 
     /// Adds a stretch of `segment`: its ends, and the middle where the segment is curved; one point where that is all it is.
     pub fn add(&mut self, segment: &Segment, from_s: f64, duration_s: f64) {
-        self.point(segment, from_s);
-        if duration_s == 0.0 {
-            return;
-        }
-        self.point(segment, from_s + duration_s);
-        if (0..self.axes).any(|axis| segment.coefficients[axis][3] != 0.0) {
-            self.point(segment, from_s + duration_s / 2.0);
+        let (to_s, middle_s) = (from_s + duration_s, from_s + duration_s / 2.0);
+        // One stands for another where there are fewer.
+        let (count, times) = if duration_s == 0.0 {
+            (1, [from_s; 4])
+        } else if (0..self.axes).any(|axis| segment.coefficients[axis][3] != 0.0) {
+            (3, [from_s, to_s, middle_s, middle_s])
+        } else {
+            (2, [from_s, to_s, to_s, to_s])
+        };
+        self.compare(segment, &times);
+        if self.keeps_points {
+            times[..count].iter().for_each(|t| self.point(segment, *t));
+        } else {
+            self.count += count;
         }
         self.covered_s += duration_s;
     }
 
-    fn point(&mut self, segment: &Segment, t: f64) {
+    /// Compares with the limits how `segment` moves at several times at once, side by side.
+    fn compare(&mut self, segment: &Segment, times: &[f64; 4]) {
         let per_speed = &self.per_speed[usize::from(segment.flags.contains(SegmentFlags::RAPID))];
-        let point = &mut self.list[self.count];
-        let (mut speed_ratio, mut acceleration_ratio) = (self.speed_ratio, self.acceleration_ratio);
+        let mut speed = [self.speed_ratio; 4];
+        let mut acceleration = [self.acceleration_ratio; 4];
         for (axis, c) in segment.coefficients[..self.axes].iter().enumerate() {
-            let velocity =
-                c[1] + t * (2.0 * c[2] + t * (3.0 * c[3] + t * (4.0 * c[4] + t * 5.0 * c[5])));
-            let acceleration = 2.0 * c[2] + t * (6.0 * c[3] + t * (12.0 * c[4] + t * 20.0 * c[5]));
+            let (per_speed, per_acceleration) = (per_speed[axis], self.per_acceleration[axis]);
             let takeback = segment.step_acceleration[axis];
-            let smooth = acceleration + takeback;
-            point.velocity[axis] = velocity - segment.step_velocity[axis] + takeback * t;
-            point.acceleration[axis] = smooth;
-            speed_ratio = larger(speed_ratio, velocity.abs() * per_speed[axis]);
-            acceleration_ratio = larger(
-                acceleration_ratio,
-                smooth.abs() * self.per_acceleration[axis],
-            );
+            for n in 0..4 {
+                let [velocity, bend] = derivatives(c, times[n]);
+                speed[n] = larger(speed[n], velocity.abs() * per_speed);
+                acceleration[n] =
+                    larger(acceleration[n], (bend + takeback).abs() * per_acceleration);
+            }
         }
-        (self.speed_ratio, self.acceleration_ratio) = (speed_ratio, acceleration_ratio);
+        self.speed_ratio = speed.into_iter().fold(0.0, larger);
+        self.acceleration_ratio = acceleration.into_iter().fold(0.0, larger);
+    }
+
+    /// Keeps the point at `t`.
+    fn point(&mut self, segment: &Segment, t: f64) {
+        let point = &mut self.list[self.count];
+        for (axis, c) in segment.coefficients[..self.axes].iter().enumerate() {
+            let [velocity, acceleration] = derivatives(c, t);
+            let takeback = segment.step_acceleration[axis];
+            point.velocity[axis] = velocity - segment.step_velocity[axis] + takeback * t;
+            point.acceleration[axis] = acceleration + takeback;
+        }
         self.count += 1;
     }
+}
+
+/// First and second derivative of a polynomial at `t`.
+#[inline]
+fn derivatives(c: &[f64; 6], t: f64) -> [f64; 2] {
+    [
+        c[1] + t * (2.0 * c[2] + t * (3.0 * c[3] + t * (4.0 * c[4] + t * 5.0 * c[5]))),
+        2.0 * c[2] + t * (6.0 * c[3] + t * (12.0 * c[4] + t * 20.0 * c[5])),
+    ]
 }
 
 /// The larger of two numbers of which the first is one: one instruction, where `f64::max` also looks for NaN there.

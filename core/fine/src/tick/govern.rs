@@ -135,7 +135,11 @@ impl PlanFollower {
         Self {
             cursor,
             governor: Governor::new(limits, axes, config.period_s),
-            points: PeriodPoints::new(limits, axes),
+            points: if config.order >= 3 {
+                PeriodPoints::new(limits, axes).without_points()
+            } else {
+                PeriodPoints::new(limits, axes)
+            },
             horizon: Horizon::new(limits, axes, config.period_s),
             slowdowns: Slowdowns::new(),
             line_end: LineEnd::default(),
