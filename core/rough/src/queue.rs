@@ -265,14 +265,15 @@ impl SegmentSink for Queue {
             self.stage_event(event);
         }
         let stop_on = self.stop_on(segment.block);
-        // A segment is large: it is copied to its place, and marked there.
-        let staged = self.staged.push_mut(Queued::Segment {
-            start_s: self.emitted_s,
+        // A segment is large: it is copied to its place, and marked there. To push it would copy it twice.
+        let start_s = self.emitted_s;
+        self.staged.extend(std::iter::once_with(|| Queued::Segment {
+            start_s,
             segment: *segment,
-        });
-        if let Queued::Segment {
+        }));
+        if let Some(Queued::Segment {
             segment: marked, ..
-        } = staged
+        }) = self.staged.last_mut()
         {
             (marked.epoch, marked.stop_on) = (self.epoch, stop_on);
             marked.path[0] += self.path_start_mm;

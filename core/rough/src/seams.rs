@@ -37,7 +37,7 @@ impl Seams {
         if !segment.flags.contains(SegmentFlags::ENDS_AT_REST) {
             self.end = Some(derivatives(segment, segment.duration_s));
         }
-        let start = derivatives(segment, 0.0);
+        let start = derivatives_at_start(segment);
         before.is_some_and(|end| {
             let off = |n: usize| {
                 (0..MAX_AXES).any(|axis| (start[n][axis] - end[n][axis]).abs() > self.rounding[n])
@@ -49,6 +49,14 @@ impl Seams {
 
 fn derivatives(segment: &Segment, t_s: f64) -> [AxisVector; 2] {
     [segment.velocity(t_s), segment.acceleration(t_s)]
+}
+
+/// The same at the start, where they are coefficients.
+fn derivatives_at_start(segment: &Segment) -> [AxisVector; 2] {
+    let of = |f: fn(&[f64; 6]) -> f64| {
+        AxisVector(std::array::from_fn(|axis| f(&segment.coefficients[axis])))
+    };
+    [of(|c| c[1]), of(|c| 2.0 * c[2])]
 }
 
 #[cfg(test)]
