@@ -96,6 +96,10 @@ impl RunObserver for Observer {
         self.corrections.event(event);
     }
 
+    fn needs_each_deviation(&self) -> bool {
+        self.report.is_some()
+    }
+
     fn sample(&mut self, sample: &Sample, deviation_mm: f64, signals: &[f64]) {
         if let Some(trace) = &mut self.trace {
             self.broken.note(trace.sample(sample, signals));

@@ -331,6 +331,10 @@ impl RunObserver for Sinks {
         self.operator.policy(summary);
     }
 
+    fn needs_each_deviation(&self) -> bool {
+        self.report.is_some()
+    }
+
     fn sample(&mut self, sample: &Sample, deviation_mm: f64, signals: &[f64]) {
         self.progress.sample(sample);
         self.operator.sample(sample, self.progress.share());

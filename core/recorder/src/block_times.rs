@@ -113,7 +113,9 @@ impl BlockTimes {
         let mut left_s = if self.started { self.period_s } else { 0.0 };
         self.started = true;
         let asked = self.asked(sample);
-        let here = self.open.partition_point(|open| open.index < sample.block);
+        // They are few: each sample forgets those that it has left behind.
+        let behind = self.open.iter();
+        let here = behind.take_while(|open| open.index < sample.block).count();
         // Blocks that are shorter than the period have passed inside it: each takes its part of the way.
         let behind_mm: f64 = self
             .open

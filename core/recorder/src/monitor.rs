@@ -117,8 +117,9 @@ impl Monitor {
         each.fold(0.0, f64::max)
     }
 
-    /// A sample was sent. Gives its distance from the path, mm.
-    pub fn sample(&mut self, sample: &Sample) -> f64 {
+    /// A sample was sent. Gives its distance from the path, mm; where nobody needs `each` of them, only the largest so far is exact,
+    /// and the others are less than that.
+    pub fn sample(&mut self, sample: &Sample, each: bool) -> f64 {
         // A drive that homes its joint by itself has no samples; where it stands then is no motion.
         if self.samples == 0 || sample.tick != self.last_tick + 1 {
             self.last = [sample.command, AxisVector::ZERO, AxisVector::ZERO];
@@ -137,9 +138,10 @@ impl Monitor {
         };
         self.times.sample(sample, part, |_, _| {});
         self.samples += 1;
-        let velocity = (sample.command - self.last[0]) * (1.0 / self.period_s);
-        let acceleration = (velocity - self.last[1]) * (1.0 / self.period_s);
-        let jerk = (acceleration - self.last[2]) * (1.0 / self.period_s);
+        let per_s = 1.0 / self.period_s;
+        let velocity = (sample.command - self.last[0]) * per_s;
+        let acceleration = (velocity - self.last[1]) * per_s;
+        let jerk = (acceleration - self.last[2]) * per_s;
         for (peak, now) in self.peaks.iter_mut().zip([&velocity, &acceleration, &jerk]) {
             raise(peak, now);
         }
@@ -150,6 +152,6 @@ impl Monitor {
             joints.sample(&sample.command);
         }
         self.position = sample.command;
-        self.watch.sample(sample.block, &sample.command)
+        self.watch.sample(sample.block, &sample.command, each)
     }
 }

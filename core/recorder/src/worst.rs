@@ -14,6 +14,9 @@ pub struct Worst {
     period_s: f64,
     /// Per axis and sign: by how much the velocity has changed more than the acceleration limit explains, mm/s.
     beyond: [[f64; 2]; MAX_AXES],
+    /// Largest |velocity|, |change of velocity| and |jerk| of which the share of the limit is known: what is no larger has no larger
+    /// share, and most samples need no division.
+    largest: [[f64; 3]; MAX_AXES],
     of_limits: [OfLimits; MAX_AXES],
 }
 
@@ -31,6 +34,7 @@ impl Worst {
             axes,
             period_s,
             beyond,
+            largest: [[-1.0; 3]; MAX_AXES],
             of_limits,
         }
     }
@@ -62,24 +66,46 @@ impl Worst {
     /// A sample with these finite differences: velocity, acceleration and jerk.
     pub fn sample(&mut self, sample: &Sample, [velocity, acceleration, jerk]: [&AxisVector; 3]) {
         for axis in 0..self.axes {
-            let share = self.of_acceleration(axis, acceleration[axis] * self.period_s);
-            let limits = &self.limits[axis];
-            let fastest = limits.feed_mm_per_s.max(limits.rapid_mm_per_s);
-            let of = &mut self.of_limits[axis];
-            raise(&mut of.velocity, velocity[axis].abs() / fastest, sample);
-            raise(&mut of.acceleration, share, sample);
-            raise(
-                &mut of.jerk,
-                jerk[axis].abs() / limits.jerk_mm_per_s3,
-                sample,
-            );
+            let change = acceleration[axis] * self.period_s;
+            if self.is_beyond_steps(axis, change) || is_larger(&mut self.largest[axis][1], change) {
+                let share = self.of_acceleration(axis, change);
+                raise(&mut self.of_limits[axis].acceleration, share, sample);
+            }
+            let (limits, of) = (&self.limits[axis], &mut self.of_limits[axis]);
+            let [fastest_seen, _, most_jerk] = &mut self.largest[axis];
+            if is_larger(fastest_seen, velocity[axis]) {
+                let fastest = limits.feed_mm_per_s.max(limits.rapid_mm_per_s);
+                raise(&mut of.velocity, velocity[axis].abs() / fastest, sample);
+            }
+            if is_larger(most_jerk, jerk[axis]) {
+                raise(
+                    &mut of.jerk,
+                    jerk[axis].abs() / limits.jerk_mm_per_s3,
+                    sample,
+                );
+            }
         }
+    }
+
+    /// Whether `change` of the velocity of `axis` in one period is more than the limit explains, or one before it was.
+    fn is_beyond_steps(&self, axis: usize, change: f64) -> bool {
+        let most = self.limits[axis].acceleration_mm_per_s2 * self.period_s;
+        change.abs() > most || self.beyond[axis] != [0.0; 2]
     }
 
     /// What was worst of the limits of `axis`.
     pub fn of_axis(&self, axis: usize) -> OfLimits {
         self.of_limits[axis]
     }
+}
+
+/// Whether `value` is of a larger magnitude than any before it, of which `largest` is the largest.
+fn is_larger(largest: &mut f64, value: f64) -> bool {
+    let larger = value.abs() > *largest;
+    if larger {
+        *largest = value.abs();
+    }
+    larger
 }
 
 fn raise(worst: &mut OfLimit, share: f64, sample: &Sample) {

@@ -200,6 +200,10 @@ impl RunObserver for Joined<'_> {
         self.observer.broken_record()
     }
 
+    fn needs_each_deviation(&self) -> bool {
+        self.observer.needs_each_deviation()
+    }
+
     fn sample(&mut self, sample: &Sample, deviation_mm: f64, signals: &[f64]) {
         let sample = Sample {
             command: self.apart.joined(&sample.command),

@@ -70,6 +70,12 @@ pub trait RunObserver {
         None
     }
 
+    /// Whether the distance from the path is to be exact in each sample, and not only where it is the largest so far: looking for the
+    /// nearest block takes its time.
+    fn needs_each_deviation(&self) -> bool {
+        false
+    }
+
     /// A sample was sent, `deviation_mm` off the programmed path; `signals` are the strategy's last values.
     fn sample(&mut self, _sample: &Sample, _deviation_mm: f64, _signals: &[f64]) {}
 }
@@ -263,11 +269,12 @@ impl<'a> SoftLoop<'a> {
             return;
         };
         let (first, second) = come.as_slices();
+        let each_deviation = self.observer.needs_each_deviation();
         for sample in first.iter().chain(second) {
-            for command in self.commands.sample(sample) {
-                self.observer.command(&command);
+            if let Some(commands) = self.commands.sample(sample) {
+                commands.for_each(|command| self.observer.command(&command));
             }
-            let deviation_mm = self.monitor.sample(sample);
+            let deviation_mm = self.monitor.sample(sample, each_deviation);
             let (signals, count) = signals(self.feed.as_ref(), &self.analog, sample);
             self.observer
                 .sample(sample, deviation_mm, &signals[..count]);
