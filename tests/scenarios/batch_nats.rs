@@ -18,6 +18,9 @@ use tandem_batch_nats::{Server as At, Worker};
 
 use crate::harness::root;
 
+/// Values of the second key that varies: of one key there are a thousand at most.
+const RATIOS: usize = 10;
+
 fn server() -> Option<PathBuf> {
     let named = std::env::var_os("TANDEM_NATS_SERVER").map(PathBuf::from);
     let own = root().join("target/nats/bin/nats-server");
@@ -112,8 +115,14 @@ fn what_comes_from_killed_workers_and_a_killed_server_is_what_comes_from_one_com
         println!("skipped: no nats-server is installed");
         return;
     };
-    // How many jobs: more by hand, for a long night.
-    let count = std::env::var("TANDEM_NATS_JOBS").unwrap_or_else(|_| "40".to_string());
+    // How many jobs: ten thousand by hand, which takes minutes.
+    let count: usize = std::env::var("TANDEM_NATS_JOBS").map_or(40, |count| count.parse().unwrap());
+    // Then a worker is killed every two seconds until all is done; of a few jobs each would be tried too often.
+    let (kill_every, kills) = if count < 1000 {
+        (Duration::from_millis(300), 3)
+    } else {
+        (Duration::from_secs(2), usize::MAX)
+    };
     let folder = tempfile::tempdir().unwrap();
     let mut server = Server::start(binary, folder.path());
     let url = server.url.clone();
@@ -123,9 +132,12 @@ fn what_comes_from_killed_workers_and_a_killed_server_is_what_comes_from_one_com
     let of = |place: &str| root().join(place).display().to_string();
     let machine = of("examples/machines/mill-3axis-smooth.toml");
     let program = of("examples/programs/square.ngc");
-    let vary = format!("motion.path_tolerance_mm=0.005..0.05:{count}");
+    let tolerances = format!("motion.path_tolerance_mm=0.005..0.05:{}", count / RATIOS);
+    let ratios = format!("motion.max_feed_ratio=1.05..1.95:{RATIOS}");
     #[rustfmt::skip]
-    let jobs = ["--machine", &machine, "--programs", &program, "--vary", &vary];
+    let jobs = [
+        "--machine", &machine, "--programs", &program, "--vary", &tolerances, "--vary", &ratios,
+    ];
     let submit = |to: &str, more: &[&str]| {
         done(&tandem(
             &[&["batch", "submit", to], &jobs[..], more].concat(),
@@ -142,17 +154,24 @@ fn what_comes_from_killed_workers_and_a_killed_server_is_what_comes_from_one_com
         command.args(at).stdout(Stdio::null()).spawn().unwrap()
     };
     let mut steady = worker();
-    for round in 0..3 {
-        let mut killed = worker();
-        sleep(Duration::from_millis(300));
-        killed.kill().unwrap();
-        killed.wait().unwrap();
-        if round == 1 {
+    let mut killed = 0;
+    while killed < kills && steady.try_wait().unwrap().is_none() {
+        let mut one = worker();
+        sleep(kill_every);
+        one.kill().unwrap();
+        one.wait().unwrap();
+        killed += 1;
+        if killed == 2 {
             server.kill_and_start_again();
         }
     }
+    println!("{count} jobs, {killed} workers killed");
+    assert!(killed > 2, "the jobs are done before the server was killed");
+    assert!(
+        steady.wait().unwrap().success(),
+        "the worker that nobody killed"
+    );
     assert!(worker().wait().unwrap().success());
-    assert!(steady.wait().unwrap().success());
     let command = |what: &str| tandem(&[&["batch", what, &desk], &at[..]].concat());
     let status = command("status");
     done(&status);
@@ -162,7 +181,7 @@ fn what_comes_from_killed_workers_and_a_killed_server_is_what_comes_from_one_com
         "{said}"
     );
     done(&command("collect"));
-    assert_eq!(results(Path::new(&whole)).len().to_string(), count);
+    assert_eq!(results(Path::new(&whole)).len(), count);
     assert_eq!(results(Path::new(&whole)), results(Path::new(&desk)));
     let table = |folder: &str| fs::read(Path::new(folder).join("results.csv")).unwrap();
     assert_eq!(table(&whole), table(&desk));
