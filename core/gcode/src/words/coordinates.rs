@@ -2,7 +2,7 @@
 
 use tandem_sdk::AxisVector;
 
-use super::{Action, Group, Word, nothing, tool};
+use super::{Action, Group, Word, tool};
 use crate::config::Tool;
 use crate::line::Line;
 use crate::line_error::{Checked, LineError};
@@ -31,7 +31,7 @@ pub(super) const WORDS: &[Word] = &[
         Group::NonModal,
         "",
         "machine coordinates, in this line",
-        Action::Act(nothing),
+        Action::Act(machine_coordinates),
         "G53 G0 X1",
     ),
     Word::new(
@@ -171,6 +171,16 @@ pub(super) const WORDS: &[Word] = &[
         "G30.1",
     ),
 ];
+
+/// G53 holds for the axis words of its line, which the motion asks for. On its own it would be taken for a mode by whoever
+/// wrote it.
+fn machine_coordinates(line: &mut Line) -> Checked<()> {
+    if line.orders.motion.is_some() || line.orders.has(Group::Motion) {
+        return Ok(());
+    }
+    let message = "G53 holds for the axis words of its line, and there are none: it is no mode";
+    Err(line.orders.error(Group::NonModal, "axis-missing", message))
+}
 
 fn select(line: &mut Line, system: usize) -> Checked<()> {
     line.state.coordinates.select(system);
@@ -433,7 +443,7 @@ fn go_to_reference(line: &mut Line, which: usize) -> Checked<()> {
 
 #[cfg(test)]
 mod tests {
-    use crate::testing::{ends, last, messages, short};
+    use crate::testing::{ends, last, messages, mill, run_on, short};
 
     #[test]
     fn offsets_add_up() {
@@ -538,5 +548,17 @@ mod tests {
             ends("G10 L2 P9 Z5\nG53 G0 Z30\nG10 L11 P1 Z3\nG43 H1\nG0 Z1")[1],
             ["0", "0", "23"]
         );
+    }
+
+    #[test]
+    fn machine_coordinates_are_no_mode() {
+        assert_eq!(run_on(mill(), "G53 G0\nX1\nG53 X2").1.len(), 0);
+        for wrong in ["G53", "G0 X1\nG53", "G53 G90 S100"] {
+            let found = run_on(mill(), wrong).1;
+            assert!(
+                found.len() == 1 && found[0].code == "axis-missing",
+                "{wrong}: {found:?}"
+            );
+        }
     }
 }

@@ -253,13 +253,18 @@ fn axes(letters: &Letters, plane: [u8; 2]) -> Option<(usize, [usize; 2])> {
     .then_some(found)
 }
 
+/// The word of an axis, mm: X may be a diameter.
+fn word_mm(line: &Line, axis: usize) -> Option<f64> {
+    let value = line.words.get(line.letters.letter(axis))?;
+    Some(value * line.state.modes.word_scale(line.letters, axis))
+}
+
 /// What the line says of its holes; `at` is where it begins.
 fn holes(line: &mut Line, kind: Kind, at: &AxisVector) -> Checked<Holes> {
     let plane = line.state.modes.plane.letters();
     let missing = || line.motion_fault("axis", "a canned cycle needs the linear axes X Y Z");
     let (normal, plane) = axes(line.letters, plane).ok_or_else(missing)?;
-    let sticky = sticky(line, kind, line.letters.letter(normal))?;
-    let unit_mm = line.state.modes.unit_mm;
+    let sticky = sticky(line, kind, normal)?;
     let initial_mm = *line.state.cycles.initial_mm.get_or_insert(at[normal]);
     let (r_mm, depth_mm) = (
         sticky.r_mm.unwrap_or_default(),
@@ -272,12 +277,7 @@ fn holes(line: &mut Line, kind: Kind, at: &AxisVector) -> Checked<Holes> {
     if r_mm < bottom_mm {
         return Err(line.motion_fault("cycle", "R lies below the bottom of the hole"));
     }
-    let named = plane.map(|axis| {
-        line.words
-            .get(line.letters.letter(axis))
-            .unwrap_or_default()
-            * unit_mm
-    });
+    let named = plane.map(|axis| word_mm(line, axis).unwrap_or_default());
     let step = if line.state.modes.absolute {
         [0.0; 2]
     } else {
@@ -316,13 +316,13 @@ fn holes(line: &mut Line, kind: Kind, at: &AxisVector) -> Checked<Holes> {
 }
 
 /// The words of the line, and those that earlier lines of the same cycle have left.
-fn sticky(line: &mut Line, kind: Kind, normal: u8) -> Checked<Sticky> {
+fn sticky(line: &mut Line, kind: Kind, normal: usize) -> Checked<Sticky> {
     let unit_mm = line.state.modes.unit_mm;
     let left = line.state.cycles.sticky;
     let given = |letter| line.words.get(letter).map(|value| value * unit_mm);
     let sticky = Sticky {
         r_mm: given(b'R').or(left.r_mm),
-        depth_mm: given(normal).or(left.depth_mm),
+        depth_mm: word_mm(line, normal).or(left.depth_mm),
         peck_mm: given(b'Q').or(left.peck_mm),
         dwell_s: line.words.not_negative(b'P')?.or(left.dwell_s),
     };
@@ -332,7 +332,8 @@ fn sticky(line: &mut Line, kind: Kind, normal: u8) -> Checked<Sticky> {
             format!("{} needs {what}", line.orders.motion_code()),
         )
     };
-    let bottom = format!("{}, the bottom of the hole", normal as char);
+    let letter = line.letters.letter(normal);
+    let bottom = format!("{}, the bottom of the hole", letter as char);
     for (lacks, what) in [
         (
             sticky.r_mm.is_none(),
@@ -387,11 +388,8 @@ fn drill(line: &mut Line, holes: &Holes, at: &mut AxisVector) -> Checked<()> {
     }
     for _ in 0..holes.count {
         for (axis, step) in holes.plane.into_iter().zip(holes.step) {
-            let named = line
-                .words
-                .get(line.letters.letter(axis))
-                .filter(|_| line.state.modes.absolute);
-            at[axis] = named.map_or(at[axis] + step, |value| value * line.state.modes.unit_mm);
+            let named = word_mm(line, axis).filter(|_| line.state.modes.absolute);
+            at[axis] = named.unwrap_or(at[axis] + step);
         }
         if let (Some(polar), Some([x, y])) = (line.words.polar, line.state.coordinates.plane()) {
             let (unit_mm, absolute) = (line.state.modes.unit_mm, line.state.modes.absolute);

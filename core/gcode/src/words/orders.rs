@@ -8,7 +8,8 @@ use crate::syntax::line_words::{Code, LineWords, Polar};
 
 /// Letters that any line may have.
 const ALWAYS: u32 = mask("NOFST");
-const ARC_LETTERS: u32 = mask("IJKR");
+/// With any of these an arc goes on in a line without its word. R alone is that of another word, as M19's.
+const ARC_LETTERS: u32 = mask("IJK");
 /// Letters that several words of a line may take together.
 const SHARED: u32 = AXIS_MASK | SPINDLE_BIT;
 
@@ -181,7 +182,10 @@ impl Orders {
         }
         self.motion = Some(motion);
         if let Some(polar) = &words.polar {
-            if self.has(Group::NonModal) {
+            if self
+                .get(Group::NonModal)
+                .is_some_and(|word| word.code == "G53")
+            {
                 return Err(polar_misplaced(polar));
             }
             check_polar(polar, motion, words, letters)?;

@@ -312,6 +312,10 @@ mod tests {
                 "End",
             ],
         );
+        assert!(
+            messages("F60 G2 X2 I1\nM19 R90").is_empty(),
+            "R is not the arc's"
+        );
         for wrong in ["M19", "M19 R360", "M19 R1 P3"] {
             assert_eq!(messages(wrong).len(), 1, "{wrong}");
         }

@@ -116,3 +116,19 @@ fn what_a_cycle_lacks_is_named() {
         );
     }
 }
+
+#[test]
+fn x_is_a_diameter_where_it_is_one() {
+    assert_eq!(
+        ends("G7 F60\nG81 X6 Y1 Z-1 R1"),
+        ends("F60\nG81 X3 Y1 Z-1 R1")
+    );
+    assert_eq!(
+        ends("G7 F60\nG91 G18 G81 X6 Y-1 Z2 R1 L2"),
+        ends("F60\nG91 G18 G81 X3 Y-1 Z2 R1 L2")
+    );
+    assert_eq!(
+        ends("G7 F60\nG19 G81 X6 Y1 Z-1 R7"),
+        ends("F60\nG19 G81 X3 Y1 Z-1 R7")
+    );
+}
