@@ -20,6 +20,8 @@ pub(crate) struct Coordinates {
     plane: Option<[usize; 2]>,
     active: usize,
     g92: AxisVector,
+    /// G92 is in force, whatever it is: neither cleared nor suspended.
+    g92_applies: bool,
     /// What G92.3 restores.
     g92_stored: AxisVector,
     tool: AxisVector,
@@ -41,6 +43,7 @@ impl Coordinates {
             plane,
             active: 0,
             g92: zero,
+            g92_applies: false,
             g92_stored: zero,
             tool: zero,
             total: zero,
@@ -183,23 +186,32 @@ impl Coordinates {
     pub fn set_g92(&mut self, g92: AxisVector) {
         self.g92 = g92;
         self.g92_stored = g92;
+        self.g92_applies = true;
         self.sum_up();
+    }
+
+    /// Whether G92 is in force, whatever it is.
+    pub fn g92_applies(&self) -> bool {
+        self.g92_applies
     }
 
     /// G92.1
     pub fn clear_g92(&mut self) {
         self.set_g92(AxisVector::ZERO);
+        self.g92_applies = false;
     }
 
     /// G92.2
     pub fn suspend_g92(&mut self) {
         self.g92 = AxisVector::ZERO;
+        self.g92_applies = false;
         self.sum_up();
     }
 
     /// G92.3
     pub fn restore_g92(&mut self) {
         self.g92 = self.g92_stored;
+        self.g92_applies = true;
         self.sum_up();
     }
 
@@ -225,6 +237,7 @@ impl Coordinates {
         self.rotations = lasting.rotations_rad;
         self.active = lasting.active_system.min(SYSTEMS - 1);
         (self.g92, self.g92_stored) = (lasting.g92, lasting.g92_stored);
+        self.g92_applies = self.g92 != AxisVector::ZERO;
         (self.reference, self.tool) = (lasting.reference, lasting.tool_offset);
         self.sum_up();
     }

@@ -50,6 +50,8 @@ pub(super) const WORDS: &[Word] = &[
 struct Saved {
     modes: Modes,
     system: usize,
+    /// G92 was in force; which offset it is, is not saved.
+    g92_applies: bool,
     /// The length of the tool in force, and the tool that was in the spindle.
     tool: AxisVector,
     in_spindle: u32,
@@ -105,6 +107,7 @@ fn save(line: &mut Line) -> Checked<()> {
     let saved = Saved {
         modes: state.modes.clone(),
         system: state.coordinates.active(),
+        g92_applies: state.coordinates.g92_applies(),
         tool: *state.coordinates.tool(),
         in_spindle: state.tools.in_spindle,
         cycles_to_initial: state.cycles.return_to_initial(),
@@ -142,6 +145,12 @@ fn restore(line: &mut Line) -> Checked<()> {
 fn put_back(line: &mut Line, saved: &Saved) {
     line.state.modes = saved.modes.clone();
     line.state.coordinates.select(saved.system);
+    let coordinates = &mut line.state.coordinates;
+    match (coordinates.g92_applies(), saved.g92_applies) {
+        (true, false) => coordinates.suspend_g92(),
+        (false, true) => coordinates.restore_g92(),
+        _ => {}
+    }
     line.state.cycles.set_to_initial(saved.cycles_to_initial);
     // The length of another tool would drive the one in the spindle to the wrong height.
     if saved.in_spindle == line.state.tools.in_spindle {
@@ -187,6 +196,19 @@ mod tests {
             ends("T1 M6 G43\nM70\nT2 M6 G43\nM72\nG0 Z0"),
             [["0", "0", "25"]]
         );
+    }
+
+    #[test]
+    fn whether_g92_is_in_force_is_restored_and_not_which_offset() {
+        for (program, x) in [
+            ("M70\nG92 X4\nM72\nG0 X1", "1"),
+            ("G0 X1\nG92 X4\nM70\nG92.2\nM72\nG0 X0", "-3"),
+            ("G0 X1\nG92 X4\nM70\nG92.1\nM72\nG0 X0", "0"),
+            ("G0 X1\nG92 X4\nM70\nG92 X7\nM72\nG0 X0", "-6"),
+            ("G92 X0\nM70\nG92 X7\nM72\nG0 X0", "-7"),
+        ] {
+            assert_eq!(ends(program).last().unwrap()[0], x, "{program}");
+        }
     }
 
     #[test]
