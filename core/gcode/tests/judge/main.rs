@@ -158,6 +158,11 @@ fn programs_with_offsets_and_rotation() {
     judge_all("offsets", 60, 9, programs::with_offsets);
 }
 
+#[test]
+fn programs_with_modes() {
+    judge_all("modes", 60, 8, programs::with_modes);
+}
+
 /// Calls, loops, cycles and offsets leave nothing in the path that their moves alone would not: a planner drives both in the same
 /// time. And a program makes the same blocks whenever it is read.
 #[test]

@@ -381,6 +381,68 @@ pub fn with_offsets(seed: u64) -> String {
     writer.text
 }
 
+/// Modes that words of other subjects must mind: planes, diameters, distances, what M70 saves, and words that share letters.
+pub fn with_modes(seed: u64) -> String {
+    let mut writer = Writer::new(seed, 0);
+    writer.line("S100 M3 $0\nG0 X1 Y2 Z30");
+    let mut plane = ['X', 'Y', 'Z'];
+    for _ in 0..14 {
+        let [x, y, z] = [0; 3].map(|_| writer.below(20).cast_signed() - 9);
+        let [a, b, normal] = plane;
+        let centres: String = plane[..2]
+            .iter()
+            .zip([2, 3])
+            .map(|(axis, value)| format!(" {}{value}", (*axis as u8 - b'X' + b'I') as char))
+            .collect();
+        let line = match writer.below(14) {
+            0 => writer.random.pick(&["G7", "G8"]).to_owned(),
+            1 => {
+                let word = writer.random.pick(&["G17", "G18", "G19"]);
+                plane = match word {
+                    "G17" => ['X', 'Y', 'Z'],
+                    "G18" => ['X', 'Z', 'Y'],
+                    _ => ['Y', 'Z', 'X'],
+                };
+                word.to_owned()
+            }
+            2 => writer.random.pick(&["G90", "G91"]).to_owned(),
+            3 => format!("G3{centres}\nM19 R90\nM3"),
+            4 => format!("G2{centres}\nG4 P0.5\nG1 X{x}"),
+            5 => format!("M70\nG92 X{x} Z{z}\nG0 Y{y}\nM72"),
+            6 => format!("G92 X{x}\nM70\nG92.2 G91 G7\nG0 X{x}\nM72"),
+            7 => format!("M70\nG55 G91 G8\nG10 L20 P0 X{x} Y{y}\nG1 X{x}\nM72"),
+            8 => {
+                let word = writer
+                    .random
+                    .pick(&["G81", "G82 P0.2", "G83 Q7", "G73 Q9", "G85"]);
+                let distance = writer.random.pick(&["G90", "G91"]);
+                let ends = writer.random.pick(&["G98", "G99"]);
+                format!(
+                    "G90 G53 G0 X90 Y90 Z90\n{ends} {distance} {word} {a}{x} {b}{y} {normal}-120 R-100 L2\n{a}{z}\nG80"
+                )
+            }
+            9 => format!("G90 G17 G0 X5 Y1\n@{} ^{} G4 P0", x.abs() + 1, 10 * y),
+            10 => format!("G90 G53 G1 X{x} Z{z}"),
+            11 => {
+                let label = writer.label();
+                format!(
+                    "o{label} if [{x} GT 3]\nG0 X1\no{label} else if [{y} GT 0]\nG1 Y2\no{label} end if"
+                )
+            }
+            12 => format!("G28.1\nG28 {a}{x} {b}{y}"),
+            _ => format!("G1 X{x} Y{y}"),
+        };
+        if line.contains("G17") {
+            plane = ['X', 'Y', 'Z'];
+        }
+        writer.line(&line);
+        let (x, y) = (writer.below(9), writer.below(9));
+        writer.line(&format!("G0 X{x} Y{y}"));
+    }
+    writer.line("M2");
+    writer.text
+}
+
 /// Contours with radius compensation in XY and ZX: lines and arcs, inside and outside corners, moves across, entry and exit.
 pub fn with_compensation(seed: u64) -> String {
     let mut writer = Writer::new(seed, 0);
