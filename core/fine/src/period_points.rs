@@ -132,11 +132,11 @@ impl PeriodPoints {
         for (axis, c) in segment.coefficients[..self.axes].iter().enumerate() {
             let (per_speed, per_acceleration) = (per_speed[axis], self.per_acceleration[axis]);
             let takeback = segment.step_acceleration[axis];
-            for n in 0..4 {
-                let [velocity, bend] = derivatives(c, times[n]);
-                speed[n] = larger(speed[n], velocity.abs() * per_speed);
-                acceleration[n] =
-                    larger(acceleration[n], (bend + takeback).abs() * per_acceleration);
+            let lanes = times.iter().zip(&mut speed).zip(&mut acceleration);
+            for ((t, speed), acceleration) in lanes {
+                let [velocity, bend] = derivatives(c, *t);
+                *speed = larger(*speed, velocity.abs() * per_speed);
+                *acceleration = larger(*acceleration, (bend + takeback).abs() * per_acceleration);
             }
         }
         self.speed_ratio = speed.into_iter().fold(0.0, larger);

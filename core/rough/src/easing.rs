@@ -41,29 +41,40 @@ impl Easing {
         if segment.order < 3 {
             return 0.0;
         }
-        [0.0, 0.5, 1.0]
-            .map(|share| self.at_s(segment, share * segment.duration_s))
-            .into_iter()
-            .fold(0.0, f64::max)
-    }
-
-    /// The same at the local time `t_s`. What the plan itself brakes with along the path need not be left.
-    fn at_s(&self, segment: &Segment, t_s: f64) -> f64 {
-        let (mut whole, mut left) = (f64::INFINITY, f64::INFINITY);
-        for (c, limit) in segment.coefficients.iter().zip(&self.jerk_mm_per_s3) {
-            let (velocity, jerk) = derivatives(c, t_s);
-            if velocity != 0.0 && limit.is_finite() {
-                whole = whole.min(limit / velocity.abs());
-                left = left.min((limit + velocity.signum() * jerk) / velocity.abs());
+        // At three times side by side; the last one stands for a fourth, so that pairs of them fill registers.
+        let times = [0.0, 0.5, 1.0, 1.0].map(|share| share * segment.duration_s);
+        let [mut whole, mut left] = [[f64::INFINITY; 4]; 2];
+        let lanes = segment.coefficients.iter().zip(&self.jerk_mm_per_s3);
+        for (c, limit) in lanes.filter(|(_, limit)| limit.is_finite()) {
+            for ((t_s, whole), left) in times.iter().zip(&mut whole).zip(&mut left) {
+                let (velocity, jerk) = derivatives(c, *t_s);
+                if velocity != 0.0 {
+                    *whole = smaller(*whole, limit / velocity.abs());
+                    let rest = limit + velocity.signum() * jerk;
+                    *left = smaller(*left, rest / velocity.abs());
+                }
             }
         }
-        let (speed, path_jerk) = derivatives(&segment.path, t_s);
-        if whole.is_infinite() || speed <= 0.0 {
-            return 0.0;
-        }
-        let brakes = (-path_jerk / speed).max(0.0);
-        easing_s((left + brakes) / whole, whole)
+        let at = |n: usize| begins_s(segment, times[n], left[n], whole[n]);
+        [0, 1, 2].map(at).into_iter().fold(0.0, f64::max)
     }
+}
+
+/// How long a stop takes to begin at the local time `t_s` of `segment`, s, beyond what any stop takes, where the jerk limits are worth
+/// `whole` of the rate's second derivative, 1/s², and the plan leaves `left` of it. What the plan itself brakes with along the path need
+/// not be left.
+fn begins_s(segment: &Segment, t_s: f64, left: f64, whole: f64) -> f64 {
+    let (speed, path_jerk) = derivatives(&segment.path, t_s);
+    if whole.is_infinite() || speed <= 0.0 {
+        return 0.0;
+    }
+    let brakes = (-path_jerk / speed).max(0.0);
+    easing_s((left + brakes) / whole, whole)
+}
+
+/// The smaller one; the first where the second is no number.
+fn smaller(least: f64, value: f64) -> f64 {
+    if value < least { value } else { least }
 }
 
 /// Time in which a stop begins beyond what any stop takes, s, where the plan leaves the share `left` of the jerk limits, which are
