@@ -52,10 +52,17 @@ impl Order {
         true
     }
 
-    /// Between which samples, counted from where the window begins, a vertex at `s` may be passed.
-    pub fn around(&self, s: f64) -> (usize, usize) {
-        let first = self.last.partition_point(|place| *place < s);
-        let behind = self.first.partition_point(|place| *place <= s);
+    /// Between which samples, counted from where the window begins, a vertex at `s` may be passed. Vertices are asked for in their
+    /// order: how many samples lie before one is what was `passed` so far, or more.
+    #[inline(always)]
+    pub fn around(&self, s: f64, passed: &mut [usize; 2]) -> (usize, usize) {
+        let [first, behind] = passed;
+        while self.last.get(*first).is_some_and(|place| *place < s) {
+            *first += 1;
+        }
+        while self.first.get(*behind).is_some_and(|place| *place <= s) {
+            *behind += 1;
+        }
         (first.saturating_sub(1), behind.saturating_sub(1))
     }
 }

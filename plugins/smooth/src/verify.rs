@@ -270,6 +270,7 @@ impl<const L: usize> Checker<L> {
         let mut worst = 0.0f64;
         let mut max_bulge = 0.0f64;
         let mut piece = 0;
+        let mut passed = [0; 2];
         let mut i = run.chord_at(from, 0).max(1);
         while i < run.chords.len() && run.chords[i].s < to {
             let chord = &run.chords[i];
@@ -284,7 +285,7 @@ impl<const L: usize> Checker<L> {
             }
             if chord.s > from {
                 let before = start.before.len();
-                let (first, last) = self.order.around(chord.s);
+                let (first, last) = self.order.around(chord.s, &mut passed);
                 // Where the window begins the samples before it count too.
                 let among = (if first == 0 { 0 } else { before + first }, before + last);
                 let near = (t / period_s) as usize + before;

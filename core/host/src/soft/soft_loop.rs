@@ -270,14 +270,14 @@ impl<'a> SoftLoop<'a> {
         };
         let (first, second) = come.as_slices();
         let each_deviation = self.observer.needs_each_deviation();
+        let mut values = [0.0; MAX_SIGNALS];
         for sample in first.iter().chain(second) {
             if let Some(commands) = self.commands.sample(sample) {
                 commands.for_each(|command| self.observer.command(&command));
             }
             let deviation_mm = self.monitor.sample(sample, each_deviation);
-            let (signals, count) = signals(self.feed.as_ref(), &self.analog, sample);
-            self.observer
-                .sample(sample, deviation_mm, &signals[..count]);
+            let signals = signals(self.feed.as_ref(), &self.analog, sample, &mut values);
+            self.observer.sample(sample, deviation_mm, signals);
             if let (Some(feed), None) = (&mut self.feed, &self.soft_error)
                 && let Some(note) = feed.sample(sample, ratios, requests)
             {
@@ -364,21 +364,24 @@ impl<'a> SoftLoop<'a> {
     }
 }
 
-/// The strategy's last signals, and after them the `analog` inputs that have a name.
-fn signals(
+/// Writes the strategy's last signals, and after them the `analog` inputs that have a name; gives what was written.
+#[inline]
+fn signals<'a>(
     feed: Option<&FeedRunner>,
     analog: &[usize],
     sample: &Sample,
-) -> ([f64; MAX_SIGNALS], usize) {
-    let mut signals = feed
-        .and_then(|s| s.answer)
-        .map_or([0.0; MAX_SIGNALS], |a| a.signals);
-    let own = feed.map_or(0, |s| s.signals().len());
+    values: &'a mut [f64; MAX_SIGNALS],
+) -> &'a [f64] {
+    let mut own = 0;
+    if let Some(feed) = feed {
+        own = feed.signals().len();
+        *values = feed.answer.map_or([0.0; MAX_SIGNALS], |a| a.signals);
+    }
     let count = (own + analog.len()).min(MAX_SIGNALS);
-    for (to, from) in signals[own..count].iter_mut().zip(analog) {
+    for (to, from) in values[own..count].iter_mut().zip(analog) {
         *to = sample.analog[*from];
     }
-    (signals, count)
+    &values[..count]
 }
 
 struct Tee<'a> {
