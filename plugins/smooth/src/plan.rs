@@ -243,7 +243,7 @@ impl<const L: usize> Planning<L> {
                 round += 1;
                 continue;
             }
-            self.build(window);
+            self.build(&rests, &start.state[0], window);
             let checked =
                 self.checker
                     .check(run, frame, &counted, start, (window, travel.as_ref()));
@@ -473,8 +473,9 @@ impl<const L: usize> Planning<L> {
         t.is_finite()
     }
 
-    /// The quintics between the knots.
-    fn build(&mut self, window: &mut Window<L>) {
+    /// The quintics between the knots. A lane that `rests` stays exactly `at` its place: with the spline's rounding it would count as
+    /// one that moves in the next window, and swing within the tolerance, at a speed that no feed limits where it is not counted.
+    fn build(&mut self, rests: &[bool; L], at: &Lanes<L>, window: &mut Window<L>) {
         let h = self.spline.step_s;
         window.pieces.clear();
         window.marks.clone_from(&self.marks);
@@ -482,10 +483,11 @@ impl<const L: usize> Planning<L> {
             let [x, x1, x2, _] = self.spline.at(k, z);
             let [b, slope, _] = self.retimer.rate.at(k, z, h);
             let rate = b.max(1e-9).sqrt();
+            let moving = |l: usize, value: f64| if rests[l] { 0.0 } else { value };
             [
-                x,
-                each(|l| x1[l] * rate),
-                each(|l| x2[l] * b + x1[l] * (slope / 2.0)),
+                each(|l| if rests[l] { at[l] } else { x[l] }),
+                each(|l| moving(l, x1[l] * rate)),
+                each(|l| moving(l, x2[l] * b + x1[l] * (slope / 2.0))),
             ]
         };
         let mut from = state(0, 0.0);
