@@ -389,11 +389,9 @@ pub fn with_modes(seed: u64) -> String {
     for _ in 0..14 {
         let [x, y, z] = [0; 3].map(|_| writer.below(20).cast_signed() - 9);
         let [a, b, normal] = plane;
-        let centres: String = plane[..2]
-            .iter()
-            .zip([2, 3])
-            .map(|(axis, value)| format!(" {}{value}", (*axis as u8 - b'X' + b'I') as char))
-            .collect();
+        let centre =
+            |axis: char, value: u32| format!(" {}{value}", (axis as u8 - b'X' + b'I') as char);
+        let centres = centre(plane[0], 2) + &centre(plane[1], 3);
         let line = match writer.below(14) {
             0 => writer.random.pick(&["G7", "G8"]).to_owned(),
             1 => {

@@ -212,7 +212,7 @@ pub struct Frame {
 
 /// What a frame says.
 #[derive(Serialize)]
-struct Rows<'a> {
+struct Said<'a> {
     tick: u64,
     every: u64,
     rows: Vec<&'a [f64]>,
@@ -420,7 +420,7 @@ impl Scope {
             }
             live.age = 0;
             let rows: Vec<_> = live.rows.chunks(live.signals.len()).collect();
-            let frame = Rows {
+            let frame = Said {
                 tick: live.tick,
                 every: live.every,
                 rows,
