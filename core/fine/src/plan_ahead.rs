@@ -154,8 +154,8 @@ impl<'a> Ahead<'a> {
         })
     }
 
-    /// A place on the plan, where the machine is. `axes` axes are looked at, those of the mask `linear` are linear ones.
-    pub fn place(&self, axes: (usize, u32)) -> PlanCursor<'_> {
+    /// A place on the plan, where the machine is; `axes` are looked at.
+    pub fn place(&self, axes: Axes) -> PlanCursor<'_> {
         let queued = self.at_most(PLACE_ENTRIES);
         PlanAhead::new(self.segment, queued, axes)
             .begin(self.local_s.unwrap_or(self.segment.duration_s))
@@ -222,8 +222,41 @@ impl PlannedSpeed {
 pub struct PlanAhead<'a> {
     segment: &'a Segment,
     queued: [&'a [Queued]; 2],
-    axes: usize,
-    linear: u32,
+    axes: Axes,
+}
+
+/// The axes that are looked at.
+#[derive(Clone, Copy, Debug)]
+pub struct Axes {
+    /// Number of entries that are limited: the axes, and sums of them that are joints.
+    pub count: usize,
+    /// Bit per linear axis: where any of them moves, a feed is their speed alone.
+    pub linear: u32,
+    /// Bit per rotary axis: a feed is their speed where no linear one moves.
+    pub rotary: u32,
+}
+
+/// Two linear axes and nothing else.
+#[cfg(test)]
+pub const TWO_LINEAR: Axes = Axes {
+    count: 2,
+    linear: 0b11,
+    rotary: 0,
+};
+
+impl Axes {
+    /// Those whose speed a feed is in `segment`.
+    fn counted(&self, segment: &Segment) -> u32 {
+        let moves = |axis: usize| {
+            let c = &segment.coefficients[axis];
+            self.linear >> axis & 1 == 1 && c[1..].iter().any(|c| *c != 0.0)
+        };
+        if self.rotary == 0 || (0..self.count).any(moves) {
+            self.linear
+        } else {
+            self.rotary
+        }
+    }
 }
 
 /// Where the plan is on its path, and how fast.
@@ -231,8 +264,10 @@ pub struct PlanAhead<'a> {
 pub struct Pace {
     /// Path coordinate, mm.
     pub path_mm: f64,
-    /// Position of the linear axes, mm; zero for the others.
-    pub linear_mm: [f64; MAX_AXES],
+    /// Position of the axes whose speed a feed is here, mm or rad.
+    position: [f64; MAX_AXES],
+    /// Bit for each of them.
+    counted: u32,
     /// Path speed, mm/s of program time.
     pub speed: f64,
     /// Its rate of change, mm/s².
@@ -242,15 +277,15 @@ pub struct Pace {
 impl Pace {
     /// How far it is to `other`, mm: on the path, or straight on, whichever is more.
     pub fn way_to_mm(&self, other: &Self) -> f64 {
-        let squares = self
-            .linear_mm
-            .iter()
-            .zip(&other.linear_mm)
-            .map(|(a, b)| (b - a) * (b - a));
-        squares
-            .sum::<f64>()
-            .sqrt()
-            .max(other.path_mm - self.path_mm)
+        let both = self.counted & other.counted;
+        let mut squares = 0.0;
+        for axis in 0..MAX_AXES {
+            if both >> axis & 1 == 1 {
+                let way = other.position[axis] - self.position[axis];
+                squares += way * way;
+            }
+        }
+        squares.sqrt().max(other.path_mm - self.path_mm)
     }
 }
 
@@ -293,17 +328,12 @@ pub struct PlanCursor<'a> {
 }
 
 impl<'a> PlanAhead<'a> {
-    /// `segment` moves, `queued` follows; `axes` axes are looked at, those of the mask `linear` are linear ones.
-    pub fn new(
-        segment: &'a Segment,
-        queued: [&'a [Queued]; 2],
-        (axes, linear): (usize, u32),
-    ) -> Self {
+    /// `segment` moves, `queued` follows; `axes` are looked at.
+    pub fn new(segment: &'a Segment, queued: [&'a [Queued]; 2], axes: Axes) -> Self {
         Self {
             segment,
             queued,
             axes,
-            linear,
         }
     }
 
@@ -334,7 +364,7 @@ impl<'a> PlanCursor<'a> {
     pub fn motion(&self) -> Motion {
         let mut motion = Motion::default();
         if let Some(segment) = self.segment {
-            motion.look_at(segment, self.local_s, self.plan.axes);
+            motion.look_at(segment, self.local_s, self.plan.axes.count);
         }
         motion
     }
@@ -348,16 +378,20 @@ impl<'a> PlanCursor<'a> {
         let [speed, rise, _] = derivatives(&segment.path, self.local_s);
         let mut pace = Pace {
             path_mm: segment.path_mm(self.local_s),
-            linear_mm: [0.0; MAX_AXES],
+            position: [0.0; MAX_AXES],
+            counted: self.plan.axes.counted(segment),
             speed,
             rise,
         };
         let (mut squares, mut product) = (0.0, 0.0);
         let position = segment.position(self.local_s);
-        for axis in (0..self.plan.axes).filter(|axis| self.plan.linear >> axis & 1 == 1) {
+        for axis in 0..self.plan.axes.count {
+            if pace.counted >> axis & 1 == 0 {
+                continue;
+            }
             let [velocity, acceleration, _] =
                 derivatives(&segment.coefficients[axis], self.local_s);
-            pace.linear_mm[axis] = position[axis];
+            pace.position[axis] = position[axis];
             (squares, product) = (
                 squares + velocity * velocity,
                 product + velocity * acceleration,
@@ -510,6 +544,27 @@ mod tests {
             input.push(Queued::Event(event)).unwrap();
         }
         Cursor::new(output, &AxisVector::ZERO)
+    }
+
+    /// A quarter of the path coordinate is missing: it is a polynomial of its own.
+    #[test]
+    fn the_pace_is_that_of_rotary_axes_only_where_no_linear_one_moves() {
+        let axes = Axes {
+            count: 2,
+            linear: 0b01,
+            rotary: 0b10,
+        };
+        let mut segment = Segment::rest(&AxisVector::ZERO, 1.0);
+        (segment.path[1], segment.coefficients[1][1]) = (3.0, 4.0);
+        let seen = |segment: &Segment| {
+            let mut place = PlanAhead::new(segment, [&[], &[]], axes).begin(0.0);
+            let from = place.pace().unwrap();
+            place.advance(0.5);
+            (from.speed, from.way_to_mm(&place.pace().unwrap()))
+        };
+        assert_eq!(seen(&segment), (4.0, 2.0));
+        segment.coefficients[0][1] = 1.0;
+        assert_eq!(seen(&segment), (3.0, 1.5));
     }
 
     #[test]

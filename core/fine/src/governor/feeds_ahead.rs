@@ -165,7 +165,7 @@ fn highest(segment: &Segment, t_s: f64, ratio: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plan_ahead::PlanAhead;
+    use crate::plan_ahead::{PlanAhead, TWO_LINEAR};
     use proptest::prelude::*;
     use tandem_sdk::{AxisLimits, AxisVector, MAX_AXES};
 
@@ -199,7 +199,7 @@ mod tests {
             segment.feed_mm_per_s = from;
             let limits = limits([most, 1e6]);
             let mut governor = Governor::new(&limits, 2, 0.02 * time_s);
-            governor.look_ahead(PlanAhead::new(&segment, [&[], &[]], (2, 0b11)).begin(0.0), 1.0);
+            governor.look_ahead(PlanAhead::new(&segment, [&[], &[]], TWO_LINEAR).begin(0.0), 1.0);
             let mut w = governor.rate_in_time(0.0).powi(2) / 2.0;
             let step_s = time_s / 2000.0;
             for step in 0..2000 {

@@ -40,9 +40,16 @@ impl Governor {
             place,
             recent,
         };
-        let mut below = (aim.speed_mm_per_s > 0.0 && aim.speed_mm_per_s.min(aim.ratio).is_finite())
+        let stops = aim.speed_mm_per_s == 0.0;
+        let keeps = if stops {
+            aim.ratio
+        } else {
+            aim.speed_mm_per_s.min(aim.ratio)
+        };
+        let mut below = keeps
+            .is_finite()
             .then(|| Below::new(aim, &here, self.period_s));
-        let wanted = if below.is_some() {
+        let wanted = if below.is_some() && !stops {
             self.wanted_below(aim, horizon, &here)
         } else {
             self.wanted_freely(aim, horizon, &place)
@@ -58,17 +65,18 @@ impl Governor {
             }
             None => wanted,
         };
-        let chosen = self.choose_change(wanted, here, below.as_mut(), horizon);
+        let chosen = self.choose_change(wanted, here, (below.as_mut(), stops), horizon);
         self.end_approach(aim, horizon);
         chosen
     }
 
-    /// The σ̈ nearest to `wanted` that leaves a way on, taken.
+    /// The σ̈ nearest to `wanted` that leaves a way on, taken. Where the rate is to come to nothing, `stops`, that comes before the feed:
+    /// it is not put off for a way on which the feed is kept.
     fn choose_change(
         &mut self,
-        wanted: f64,
+        mut wanted: f64,
         mut here: RateState<'_>,
-        below: Option<&mut Below<'_>>,
+        (below, stops): (Option<&mut Below<'_>>, bool),
         horizon: &Horizon,
     ) -> Chosen {
         let is_constant = wanted == 0.0 && self.rate_per_s == 0.0;
@@ -90,6 +98,10 @@ impl Governor {
                 };
             }
             change = self.recoverable_below(wanted, here, below, horizon);
+            if change.is_none() && stops && self.recovery.keeps_feed {
+                self.recovery.keeps_feed = false;
+                wanted = wanted.min(self.recovery.peek().unwrap_or(wanted));
+            }
         } else {
             self.recovery.keeps_feed = false;
         }

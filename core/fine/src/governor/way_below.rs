@@ -341,7 +341,7 @@ fn periods_of_step(passed: u32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plan_ahead::{Ahead, derivatives};
+    use crate::plan_ahead::{Ahead, TWO_LINEAR, derivatives};
     use crate::steps::Recent;
     use proptest::prelude::*;
     use tandem_sdk::{AxisLimits, AxisVector, MAX_AXES, Segment};
@@ -403,7 +403,7 @@ mod tests {
                 let aim = Aim {
                     sigma: 1.0, speed_mm_per_s: ratio * from, ratio, kept_rate, path: [speed_at(at_s), rise, 0.0], rest_at: None,
                 };
-                let chosen = governor.smooth(&aim, &horizon, ahead.place((2, 0b11)), Recent::default());
+                let chosen = governor.smooth(&aim, &horizon, ahead.place(TWO_LINEAR), Recent::default());
                 prop_assert!(!chosen.relaxed && chosen.delta_s > 0.0, "{chosen:?} at {at_s} of {time_s} s");
                 at_s += chosen.delta_s;
             }

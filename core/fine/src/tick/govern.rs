@@ -12,6 +12,7 @@ use crate::governor::{Aim, Governor};
 use crate::horizon::Horizon;
 use crate::law::Along;
 use crate::period_points::PeriodPoints;
+use crate::plan_ahead::Axes;
 use crate::slowdowns::{LineEnd, Slowdown, Slowdowns};
 
 /// Why the rate of program time is to go down.
@@ -94,8 +95,7 @@ pub(super) struct PlanFollower {
     pub(super) period_s: f64,
     /// Order of the limits that the plan keeps.
     pub(super) order: u32,
-    /// Number of axes that are looked at, and which of them are linear.
-    axes: (usize, u32),
+    axes: Axes,
     /// The plan is made for this ratio of the programmed feeds.
     max_feed_ratio: f64,
     /// Samples beyond the limits are sent, not slowed down.
@@ -158,7 +158,11 @@ impl PlanFollower {
             chosen: Governed::NOTHING,
             period_s: config.period_s,
             order: config.order,
-            axes: (axes, config.linear),
+            axes: Axes {
+                count: axes,
+                linear: config.linear,
+                rotary: !config.linear & ((1 << config.axis_count()) - 1),
+            },
             max_feed_ratio: config.max_feed_ratio,
             // Under `count` everything is sent: forms that break limits on purpose are not slowed.
             sends_all: config.guard == GuardMode::Count,
@@ -167,7 +171,7 @@ impl PlanFollower {
 
     /// Program time passes at its own rate again, as nothing moves. Host; allocates.
     pub(super) fn forget_rate(&mut self, config: &FineConfig) {
-        self.governor = Governor::new(&config.limits.axes, self.axes.0, self.period_s);
+        self.governor = Governor::new(&config.limits.axes, self.axes.count, self.period_s);
     }
 
     /// Forgets what lies ahead in the queue: it counts no more.
@@ -299,9 +303,7 @@ impl PlanFollower {
     fn govern_steep(&mut self, ask: Ask, ratios: &Ratios, way_speed_mm_per_s: f64) -> f64 {
         let limit = self.plan_limit().min(self.request.max_rate);
         self.ask_for_rate(limit);
-        if ask == Ask::Run {
-            self.look_at_feeds(ratios);
-        }
+        self.look_at_feeds(ratios);
         let wanted = if ask == Ask::Run {
             self.ratio_target(ratios, way_speed_mm_per_s)
         } else {
@@ -315,11 +317,30 @@ impl PlanFollower {
             self.governor.choose(target, &self.points)
         };
         // Where the limits stand against the feed, or the plan changes too much in the period, it is looked at more closely.
-        let moves = self.governor.sigma() > 0.0 && !self.cursor.is_resting();
-        if ask == Ask::Run && moves && !self.is_feed_kept(sigma, ratios) {
+        if self.cursor.is_resting() || self.is_feed_kept(sigma, ratios) {
+            return self.governor.take(sigma);
+        }
+        if self.governor.sigma() > 0.0 {
             return self.govern_in_pieces(ratios, way_speed_mm_per_s, limit);
         }
+        let kept = self.kept_from_standstill(sigma, ratios);
+        let sigma = self.governor.choose(kept, &self.points);
         self.governor.take(sigma)
+    }
+
+    /// A rate below `too_high` with which a period that begins with none keeps the feed, as high as halving finds it: where it goes over
+    /// the end of a block, what is too fast behind that is not in proportion to the rate.
+    fn kept_from_standstill(&mut self, too_high: f64, ratios: &Ratios) -> f64 {
+        let (mut kept, mut high) = (0.0, too_high);
+        for _ in 0..REST_HALVINGS {
+            let sigma = f64::midpoint(kept, high);
+            *(if self.is_feed_kept(sigma, ratios) {
+                &mut kept
+            } else {
+                &mut high
+            }) = sigma;
+        }
+        if kept > 0.0 { kept } else { too_high }
     }
 
     /// Notes from which rates ratio × programmed feed can be kept ahead.
