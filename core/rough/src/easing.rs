@@ -37,6 +37,7 @@ impl Easing {
     }
 
     /// Longest time in which a stop in `segment` begins, beyond what any stop takes, s. Zero for plans that keep no jerk limit.
+    /// Rough loop; does not allocate.
     pub fn longest_s(&self, segment: &Segment) -> f64 {
         if segment.order < 3 {
             return 0.0;
@@ -78,7 +79,7 @@ fn smaller(least: f64, value: f64) -> f64 {
 }
 
 /// Time in which a stop begins beyond what any stop takes, s, where the plan leaves the share `left` of the jerk limits, which are
-/// worth `whole` of the rate's second derivative, 1/s².
+/// worth `whole_per_s2` of the rate's second derivative. Either loop; does not allocate.
 pub fn easing_s(left: f64, whole_per_s2: f64) -> f64 {
     if left >= 1.0 {
         return 0.0;

@@ -331,16 +331,9 @@ impl PlanFollower {
     /// A rate below `too_high` with which a period that begins with none keeps the feed, as high as halving finds it: where it goes over
     /// the end of a block, what is too fast behind that is not in proportion to the rate.
     fn kept_from_standstill(&mut self, too_high: f64, ratios: &Ratios) -> f64 {
-        let (mut kept, mut high) = (0.0, too_high);
-        for _ in 0..REST_HALVINGS {
-            let sigma = f64::midpoint(kept, high);
-            *(if self.is_feed_kept(sigma, ratios) {
-                &mut kept
-            } else {
-                &mut high
-            }) = sigma;
-        }
-        if kept > 0.0 { kept } else { too_high }
+        self.kept_by_halving(too_high, |follower, sigma| {
+            follower.is_feed_kept(sigma, ratios)
+        })
     }
 
     /// Notes from which rates ratio × programmed feed can be kept ahead.
@@ -538,11 +531,19 @@ impl PlanFollower {
 
     /// A rate from rest below `too_high` that is kept over the period, as high as halving finds it; that one where none is.
     fn kept_from_rest(&mut self, too_high: f64, ratios: &Ratios, way_speed_mm_per_s: f64) -> f64 {
+        self.kept_by_halving(too_high, |follower, sigma| {
+            let delta_s = sigma * follower.period_s;
+            let asked = follower.asked_of_period(delta_s, ratios, way_speed_mm_per_s);
+            sigma <= asked.at_end.min(asked.mean)
+        })
+    }
+
+    /// The highest rate below `too_high` that `is_kept`, as high as halving finds it; `too_high` where none is.
+    fn kept_by_halving(&mut self, too_high: f64, is_kept: impl Fn(&mut Self, f64) -> bool) -> f64 {
         let (mut kept, mut high) = (0.0, too_high);
         for _ in 0..REST_HALVINGS {
             let sigma = f64::midpoint(kept, high);
-            let asked = self.asked_of_period(sigma * self.period_s, ratios, way_speed_mm_per_s);
-            if sigma <= asked.at_end.min(asked.mean) {
+            if is_kept(self, sigma) {
                 kept = sigma;
             } else {
                 high = sigma;
