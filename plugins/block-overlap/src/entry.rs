@@ -26,6 +26,8 @@ pub struct Entry {
     pub kind: BlockKind,
     /// The program needs rest at the start and at the end.
     pub rests: [bool; 2],
+    /// Only rotary axes move: path and feed are in rad.
+    pub turns_only: bool,
     /// Where it starts, exactly as programmed.
     pub start: AxisVector,
     /// Where it ends, exactly as programmed.
@@ -76,6 +78,7 @@ impl Entry {
             line: 0,
             kind: BlockKind::Dwell,
             rests: [true; 2],
+            turns_only: false,
             start: AxisVector::ZERO,
             end: AxisVector::ZERO,
             arc: None,
@@ -114,6 +117,7 @@ impl Entry {
         self.end = block.end;
         self.bend = 0.0;
         self.curvature_per_mm = 0.0;
+        self.turns_only = false;
         self.arc = None;
         match block.kind {
             BlockKind::Dwell => {
@@ -133,6 +137,10 @@ impl Entry {
         self.length_mm = block.length_mm;
         let direction = (block.end - block.start) * (1.0 / block.length_mm);
         self.directions = [direction; 2];
+        if rules.has_rotary {
+            let moves = |axis: usize| rules.linear >> axis & 1 == 1 && direction[axis] != 0.0;
+            self.turns_only = !(0..rules.axes).any(moves);
+        }
         self.slope_s2_per_mm = rules.largest(&direction);
         self.set_feed(block, rules, &direction);
     }
@@ -237,8 +245,9 @@ impl Entry {
         self.arc.as_ref().map_or_else(line, |arc| arc.path)
     }
 
-    /// Whether the program needs rest between this block and `next`.
+    /// Whether rest is needed between this block and `next`: by the program, or because one feed is in mm/s and the other in
+    /// rad/s, so that no share of both could be kept of what moves together.
     pub fn rests_before(&self, next: &Self) -> bool {
-        self.rests[1] || next.rests[0]
+        self.rests[1] || next.rests[0] || self.turns_only != next.turns_only
     }
 }

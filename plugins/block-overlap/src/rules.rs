@@ -38,6 +38,10 @@ pub struct Rules {
     pub axis_mm_per_s: [AxisVector; 2],
     /// Per axis what a unit counts in path deviation: mm as they are, rotary axes in degrees, joints not at all.
     pub metric: AxisVector,
+    /// Bit per linear axis.
+    pub linear: u32,
+    /// Whether any axis is rotary.
+    pub has_rotary: bool,
     /// Fine period, s.
     pub tick_s: f64,
     /// By how much the chord between two samples may lie inside a rounded corner, mm.
@@ -73,6 +77,9 @@ impl Rules {
             },
             0.0,
         );
+        let is_linear = |axis: &usize| !context.axes.is_rotary(*axis);
+        let linear = (0..context.axes.count()).filter(is_linear);
+        let linear = linear.fold(0, |bits, axis| bits | 1 << axis);
         let squares = (0..axes.len().min(MAX_AXES)).map(|i| (acceleration(i) * metric[i]).powi(2));
         let tick_s = context.fine_period_s;
         Self {
@@ -113,6 +120,8 @@ impl Rules {
                 each(&|i| axes[i].rapid_mm_per_s, 0.0),
             ],
             metric,
+            linear,
+            has_rotary: linear.count_ones() as usize != context.axes.count(),
             tick_s,
             sag_mm: squares.sum::<f64>().sqrt() * tick_s * tick_s / 8.0,
             weakest_mm_per_s2: (0..axes.len())
