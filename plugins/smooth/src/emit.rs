@@ -23,6 +23,31 @@ pub struct DrivenPath {
     piece: Option<usize>,
 }
 
+/// What is left of blocks that share a segment.
+#[derive(Clone, Copy, Debug)]
+struct Shared {
+    /// Lowest and highest of their feeds.
+    feeds_mm_per_s: [f64; 2],
+    /// Where the last of them ends.
+    end_s: f64,
+}
+
+impl Shared {
+    /// Another block joins those that there are.
+    fn with(before: Option<Self>, feed_mm_per_s: f64, end_s: f64) -> Self {
+        let [least, most] = before.map_or([feed_mm_per_s; 2], |it| it.feeds_mm_per_s);
+        Self {
+            feeds_mm_per_s: [least.min(feed_mm_per_s), most.max(feed_mm_per_s)],
+            end_s,
+        }
+    }
+
+    /// Whether any of them has another feed than this one.
+    fn differs_from(&self, feed_mm_per_s: f64) -> bool {
+        self.feeds_mm_per_s != [feed_mm_per_s; 2]
+    }
+}
+
 impl DrivenPath {
     /// Another window begins.
     pub fn begin_window(&mut self) {
@@ -54,7 +79,7 @@ impl<const L: usize> PathAhead<L> {
         if from_s + left_s < until_s - MIN_S {
             until_s = from_s + left_s.max(MIN_S);
         }
-        let mut merged_feed = 0.0f64;
+        let mut shared: Option<Shared> = None;
         let mut ends = false;
         while let Some(leg) = self.route.front() {
             let end_s = if leg.end < self.window.end() - 1e-9 {
@@ -63,13 +88,17 @@ impl<const L: usize> PathAhead<L> {
                 f64::INFINITY
             };
             self.begin_leg(from_s, end_s, blocks, sink);
-            // Blocks of which less than a fine period is left share a segment: it is named by the last of them, and has the
-            // highest of their feeds.
+            // Blocks of which less than a fine period is left share a segment, which is named by the last of them.
             let another = self.route.items.len() > 1;
             if end_s < from_s + period_s && another {
-                merged_feed = merged_feed.max(blocks.blank.feed_mm_per_s);
+                shared = Some(Shared::with(shared, blocks.blank.feed_mm_per_s, end_s));
                 self.pop_leg();
                 continue;
+            }
+            // At a low rate a fine period of program time lasts for many samples: where feeds differ, the segment has the lowest of
+            // them and ends with the last block that it takes over.
+            if let Some(it) = shared.filter(|it| it.differs_from(blocks.blank.feed_mm_per_s)) {
+                until_s = until_s.min(it.end_s.max(from_s + MIN_S));
             }
             if end_s < until_s - period_s / 4.0 || end_s <= until_s {
                 until_s = end_s.min(until_s);
@@ -78,7 +107,13 @@ impl<const L: usize> PathAhead<L> {
             break;
         }
         let mut segment = self.draw(k, from_s, until_s, &blocks.blank);
-        segment.feed_mm_per_s = segment.feed_mm_per_s.max(merged_feed);
+        if let Some(it) = shared {
+            segment.feed_mm_per_s = if it.end_s < until_s {
+                segment.feed_mm_per_s.min(it.feeds_mm_per_s[0])
+            } else {
+                it.feeds_mm_per_s[0]
+            };
+        }
         if ends {
             segment.flags = segment.flags.with(SegmentFlags::BLOCK_ENDS);
             self.pop_leg();
