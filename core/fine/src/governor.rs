@@ -139,6 +139,9 @@ pub struct Governor {
     period_s: f64,
     acceleration: [f64; MAX_AXES],
     axes: usize,
+    /// The longest time in which an axis stops from its highest speed with its acceleration, s: for as long the rate may have to
+    /// be lowered.
+    stop_s: f64,
     /// Where jerk is not limited: the rates from which the feeds ahead can be met.
     feeds_ahead: FeedsAhead,
     /// Where jerk is limited: the recovery that was found last, and one that is being tried.
@@ -151,12 +154,15 @@ pub struct Governor {
 impl Governor {
     /// A governor at σ = 1: where nothing moves, program time passes at its own rate. Host; allocates.
     pub fn new(limits: &[AxisLimits; MAX_AXES], axes: usize, period_s: f64) -> Self {
+        let stop_s =
+            |l: &AxisLimits| l.feed_mm_per_s.max(l.rapid_mm_per_s) / l.acceleration_mm_per_s2;
         Self {
             sigma: 1.0,
             rate_per_s: 0.0,
             period_s,
             acceleration: limits.map(|l| l.acceleration_mm_per_s2),
             axes,
+            stop_s: limits[..axes].iter().map(stop_s).fold(0.0, f64::max),
             feeds_ahead: FeedsAhead::new(PeriodPoints::new(limits, axes)),
             recovery: Recovery::new(),
             tried: Recovery::new(),

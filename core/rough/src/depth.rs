@@ -10,9 +10,9 @@
 //! v / (0.95·a_s) + a_s/(0.8·J) + easing + two rough periods
 //! ```
 //!
-//! of program time in the ring, and three rough periods more as margin. v is the highest speed queued and `a_s` the least
-//! deceleration; where the longest `v/a_s` of a single segment is shorter, that counts, for σ falls by `a_s/v` at each
-//! place: where a rotary axis turns much on little path, both are small. `a_s/J`, the time in which the deceleration is
+//! of program time in the ring, and three rough periods more as margin. `v/a_s` is the longest of a single segment, for σ falls
+//! by `a_s/v` at each place; or that of which a segment of order 3 says so itself, as the bound on σ̇ that the plan leaves: where a
+//! rotary axis turns much on little path, path speed says nothing of how long it takes to stop. `a_s/J`, the time in which the deceleration is
 //! built up, is what segments of order 3 declare as the quotient of their two bounds on σ. Easing is the time
 //! before that in which a plan that uses the jerk itself leaves little of it (`easing.rs`). Both are zero for order 2.
 //! `0.95` is what the fine loop counts on, because the governor stays 0.1 % inside the limits and acts from the next
@@ -54,8 +54,6 @@ use tandem_sdk::{Segment, SegmentFlags};
 /// The worst stop over what is queued.
 #[derive(Debug)]
 pub struct QueueDepth {
-    /// Path speeds, mm/s.
-    speeds: SlidingMax,
     /// Negative stop decelerations, mm/s²: their largest is the smallest deceleration.
     decelerations: SlidingMax,
     /// Stops of each segment from its own speed with its own deceleration, s.
@@ -138,7 +136,6 @@ impl QueueDepth {
     /// Nothing queued. `factor` is the share of the worst stop that is asked for, 1 but in tests.
     pub fn new(rough_period_s: f64, fine_period_s: f64, factor: f64, easing: Easing) -> Self {
         Self {
-            speeds: SlidingMax::default(),
             decelerations: SlidingMax::default(),
             stops: SlidingMax::default(),
             ramps: SlidingMax::default(),
@@ -178,10 +175,10 @@ impl QueueDepth {
         }
         let at = |share: f64| segment.path_speed_mm_per_s(share * segment.duration_s);
         let speed = at(0.0).max(at(0.5)).max(at(1.0));
-        self.speeds.push(speed, until_s);
         self.decelerations
             .push(-segment.stop_deceleration_mm_per_s2, until_s);
-        let stop_s = speed / segment.stop_deceleration_mm_per_s2;
+        let stop_s =
+            (speed / segment.stop_deceleration_mm_per_s2).max(1.0 / segment.max_sigma_rate_per_s);
         if speed > 0.0 {
             self.stops.push(stop_s, until_s);
         }
@@ -207,7 +204,6 @@ impl QueueDepth {
 
     /// The fine loop has come to `now_s`.
     pub fn passed(&mut self, now_s: f64) {
-        self.speeds.forget(now_s);
         self.decelerations.forget(now_s);
         self.stops.forget(now_s);
         self.ramps.forget(now_s);
@@ -286,14 +282,9 @@ impl QueueDepth {
         self.ramp_s() + self.easing_s()
     }
 
-    /// Program time that must be queued, s: the worst stop, `v/a_s` and what builds it up, and two rough periods. Of highest speed over least
-    /// deceleration and the longest of single segments the shorter one counts.
+    /// Program time that must be queued, s: the longest stop of a segment and what builds it up, and two rough periods.
     pub fn required_s(&self) -> f64 {
-        let worst_s = self
-            .speeds
-            .max()
-            .map_or(0.0, |v| v / self.stop_deceleration_mm_per_s2());
-        let worst_s = worst_s.min(self.stop_s()) / STOP_SHARE;
+        let worst_s = self.stops.max().unwrap_or(0.0) / STOP_SHARE;
         self.factor * (worst_s + self.build_up_s()) + 2.0 * self.rough_period_s
     }
 }
@@ -386,11 +377,30 @@ mod tests {
 
     /// A segment that leaves this deceleration, which is built up in this time, s.
     fn built_up(segment: &Segment, ramp_s: f64) -> Segment {
+        let rate_per_s = segment.stop_deceleration_mm_per_s2 / segment.path[1];
         Segment {
-            max_sigma_rate_per_s: ramp_s,
-            max_sigma_acceleration_per_s2: 1.0,
+            max_sigma_rate_per_s: rate_per_s,
+            max_sigma_acceleration_per_s2: rate_per_s / ramp_s,
             ..*segment
         }
+    }
+
+    /// A rotary axis turns at its full speed where the path hardly gets on.
+    #[test]
+    fn a_stop_takes_as_long_as_the_slowest_axis_on_the_path_says() {
+        let turns = Segment {
+            duration_s: 0.002,
+            flags: SegmentFlags::default(),
+            max_sigma_rate_per_s: 2.0,
+            ..level(0.004, 100.0)
+        };
+        let mut depth = QueueDepth::new(0.01, 0.001, 1.0, Easing::NONE);
+        for piece in 1..=100 {
+            depth.push(&turns, f64::from(piece) * 0.002);
+        }
+        assert!((depth.required_s() - (0.5 / STOP_SHARE + 0.02)).abs() < 1e-12);
+        let rate = depth.rate_for_wall(0.0, 0.2);
+        assert!(rate < 0.9, "{rate}");
     }
 
     #[test]

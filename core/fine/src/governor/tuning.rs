@@ -36,7 +36,7 @@ pub const RECOVERY_RAMPS: f64 = 3.2;
 pub const RECOVERY_PERIODS: [f64; 2] = [16.0, 640.0];
 
 /// Order 3: for how long a way on which a feed is kept is tried out, in units of the longest time in which an axis changes its
-/// acceleration from none to its limit; and the least and most fine periods of it.
+/// acceleration from none to its limit, beside the longest time in which one stops; and the least and most fine periods of it.
 pub const FEED_WAY_RAMPS: f64 = 6.0;
 pub const FEED_WAY_PERIODS: [f64; 2] = [64.0, 2560.0];
 

@@ -62,18 +62,42 @@ impl<'a> Below<'a> {
         }
     }
 
-    /// The highest rate at the place of this number; `None` after the last, and where nothing moves there.
+    /// The highest rate from the place before to the one of this number; `None` after the last, and where nothing moves there.
     fn rate_at(&mut self, number: usize) -> Option<f64> {
-        if number == self.seen
-            && let Some(next) = self.most.get_mut(number)
-        {
-            self.place.go(self.step_s);
-            let pace = self.place.pace()?;
-            *next = self.ratio * self.place.feed_mm_per_s() / pace.speed;
+        if number == self.seen && number < PLACES {
+            self.most[number] = self.most_on_the_way()?;
             self.step_s *= FEED_POINT_SPACING;
             self.seen += 1;
         }
         self.most[..self.seen].get(number).copied()
+    }
+
+    /// Moves on to the next place, and gives the highest rate at the middle and the ends of what it passes of each segment: places
+    /// far ahead lie so far apart that an axis may get too fast, and slow again, between two of them.
+    fn most_on_the_way(&mut self) -> Option<f64> {
+        let (mut left_s, mut most) = (self.step_s, f64::INFINITY);
+        loop {
+            let stretch_s = self.place.stretch_s(left_s);
+            for half_s in [stretch_s / 2.0; 2] {
+                self.place.advance(half_s);
+                most = most.min(self.rate_here()?);
+            }
+            left_s -= stretch_s;
+            if left_s <= 0.0 {
+                return Some(most);
+            }
+            self.place.step();
+            let Some(begun) = self.rate_here() else {
+                return most.is_finite().then_some(most);
+            };
+            most = most.min(begun);
+        }
+    }
+
+    /// The highest rate at the place; `None` where nothing moves.
+    fn rate_here(&self) -> Option<f64> {
+        let pace = self.place.pace()?;
+        Some(self.ratio * self.place.feed_mm_per_s() / pace.speed)
     }
 
     /// Whether at the rate `sigma` no place ahead is too fast, which is mostly said by the first that is.
@@ -219,7 +243,8 @@ impl Governor {
     /// Most periods of a way.
     fn most_periods(&self, horizon: &Horizon) -> u32 {
         let [least, most] = FEED_WAY_PERIODS;
-        (FEED_WAY_RAMPS * horizon.reach_s / self.period_s).clamp(least, most) as u32
+        let longest_s = FEED_WAY_RAMPS * horizon.reach_s + self.stop_s;
+        (longest_s / self.period_s).clamp(least, most) as u32
     }
 
     /// Whether σ becomes constant, soonest, at a rate at which no place ahead is too fast.
