@@ -1,6 +1,6 @@
 //! What events switch: outputs, spindle, permissions. They travel to the drives with the setpoint.
 
-use tandem_rings::{FLOOD, MIST, SwitchedBy};
+use tandem_rings::{FLOOD, MIST, OperatorInputs, Switched, SwitchedBy};
 use tandem_sdk::{AxisVector, Event, EventKind, MAX_AXES};
 
 /// Which words wait for the operator.
@@ -56,6 +56,32 @@ impl Outputs {
             unhomed,
             dry_run,
         }
+    }
+
+    /// The operator's feed override, where the program permits it.
+    #[inline]
+    pub fn permitted_override(&self, inputs: &OperatorInputs) -> f64 {
+        if self.override_permitted {
+            inputs.feed_override
+        } else {
+            1.0
+        }
+    }
+
+    /// What is on.
+    pub fn switched(&self) -> Switched {
+        Switched {
+            outputs: self.bits,
+            spindle_rad_per_s: self.spindle_rad_per_s,
+            by: self.by,
+        }
+    }
+
+    /// Begins with what the job before has left on.
+    pub fn take_over(&mut self, left: &Switched) {
+        self.bits = left.outputs;
+        self.spindle_rad_per_s = left.spindle_rad_per_s;
+        self.by = left.by;
     }
 
     /// Takes an event that the path has reached.
@@ -115,6 +141,13 @@ impl Outputs {
         self.spindle_rad_per_s = 0.0;
         self.bits &= kept & !(1 << MIST | 1 << FLOOD);
         self.by = by;
+    }
+
+    /// A door stops the spindle, or lets it turn again: where it turns, that is what switches last.
+    pub fn switch_by_door(&mut self) {
+        if self.spindle_rad_per_s != 0.0 {
+            self.by = SwitchedBy::Door;
+        }
     }
 
     fn switch_by(&mut self, event: &Event, output: u32) {

@@ -1,72 +1,57 @@
-//! The fine loop itself.
+//! The fine loop itself: the order in which its parts act in a period, and what a fault does to them.
+//!
+//! Each part owns what it knows and knows nothing of this file: [`operator`] what is asked for, [`rate`] the plan and how fast
+//! program time passes, [`stops`] which rest ends an epoch, [`actuation`] the guard, the joints and the drives, [`report`] what the
+//! soft side is told. A part that finds a fault gives it back; [`FineLoop::fail`] is where the machine reacts.
 
+mod actuation;
 mod attach;
 mod drives;
-mod exchange;
-mod follow;
 mod govern;
 mod hand_over;
+mod host;
 mod joints;
-mod keep_alive;
 mod missed;
+mod operator;
 mod pieces;
 mod progress;
 mod queue;
+mod rate;
 mod ratio;
 mod release;
-mod request;
-mod rest;
+mod report;
 mod roles;
 mod single_block;
 mod spindle;
-mod succeed;
+mod stops;
 
-use std::sync::Arc;
-use std::sync::atomic::Ordering::Relaxed;
-
-use rtrb::{Consumer, Producer};
 use tandem_rings::{
-    Controls, Counters, Depth, FineEnd, MachineState, OperatorInputs, Rest, Sample, Status,
-    StopCause, StrategyRequest, Switched, SwitchedBy,
+    Counters, MachineState, Queued, Rest, RestCause, Sample, StopCause, Switched, SwitchedBy,
 };
-use tandem_sdk::{Arm, AxisVector, Driver, JointState, Kinematics, PluginError};
+use tandem_sdk::{AxisVector, Edge, EventKind, PluginError};
 
-use crate::config::FineConfig;
-use crate::cursor::Cursor;
-use crate::edge::EdgeWatch;
-use crate::fault::{Fault, FaultKind};
-use crate::guard::Guard;
-use crate::outputs::Outputs;
+use crate::answer;
+use crate::config::{FineConfig, GuardMode, Joints};
+use crate::cursor::{Reached, is_cut};
+use crate::fault::{Fault, FaultKind, InputFault};
+use crate::guard::Checked;
+use crate::outputs::{Outputs, Waits};
 use crate::ramp::Ramp;
 use crate::state::{self, Input};
-use attach::Attach;
-use drives::Drives;
-use govern::PlanFollower;
-use hand_over::HandOver;
-use joints::{JointSpace, Lead};
-use keep_alive::KeepAlive;
+use actuation::Actuation;
+use attach::Watched;
+use drives::Told;
+use govern::{Ask, Ratios};
+use hand_over::{Found, HandOver};
 use missed::Missed;
-use progress::Progress;
-use queue::QueueWatch;
-use ratio::StrategyRatio;
+use operator::Operator;
+use rate::Rate;
 use release::Release;
-use rest::Stop;
-use roles::RoleWatch;
+pub use report::{JobEnd, Left};
+use report::{Present, Report};
+use roles::{Doing, RoleWatch};
 use spindle::SpinUp;
-pub use succeed::JobEnd;
-
-/// What the drives were sent beside the axes when that last changed.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Left {
-    /// The fine period.
-    pub tick: u64,
-    /// Block that moved.
-    pub block: u64,
-    /// Program line that moved.
-    pub line: u32,
-    /// What was sent.
-    pub switched: Switched,
-}
+use stops::{Stop, Stops};
 
 #[derive(Debug)]
 #[allow(clippy::large_enum_variant)] // one of it lives for the whole run
@@ -82,110 +67,57 @@ enum Phase {
     Faulted,
 }
 
+impl Phase {
+    /// The joint in its drive's hands.
+    fn hand(&mut self) -> Option<&mut HandOver> {
+        match self {
+            Self::HandedOver(hand) => Some(hand),
+            _ => None,
+        }
+    }
+
+    /// Joints in their drives' hands, a bit each.
+    fn handed_over(&self) -> u32 {
+        match self {
+            Self::HandedOver(hand) => 1 << hand.joint(),
+            _ => 0,
+        }
+    }
+}
+
 /// The hard loop. [`FineLoop::tick`] runs on the fine thread and does not allocate; the rest is the host's.
-#[allow(clippy::struct_excessive_bools)] // each is about something else
 pub struct FineLoop {
     config: FineConfig,
-    drives: Drives,
-    space: JointSpace,
-    controls: Arc<Controls>,
-    given: OperatorInputs,
-    cause: StopCause,
-    status: Arc<Status>,
-    depth: Arc<Depth>,
-    samples: Producer<Sample>,
-    requests: Consumer<StrategyRequest>,
-    rests: Producer<Rest>,
-    ratio: StrategyRatio,
-    plan: PlanFollower,
-    /// Something has moved since the last hold between two lines.
-    line_moves: bool,
-    guard: Guard,
-    edge: EdgeWatch,
-    stop: Option<Stop>,
-    keep_alive: KeepAlive,
-    missed: Missed,
-    progress: Progress,
-    roles: RoleWatch,
-    spin_up: SpinUp,
+    operator: Operator,
+    rate: Rate,
+    stops: Stops,
     outputs: Outputs,
-    /// The drives stay enabled when the program has ended: another job may follow.
-    stays: bool,
+    spin_up: SpinUp,
+    roles: RoleWatch,
+    actuation: Actuation,
+    release: Release,
+    missed: Missed,
+    report: Report,
+    counters: Counters,
     phase: Phase,
     state: MachineState,
-    queue: QueueWatch,
     tick: u64,
-    attach: Attach,
-    /// What the drives are to catch.
-    arm: Arm,
-    release: Release,
-    left: Left,
-    counters: Counters,
     fault: Option<Fault>,
     plugin_error: Option<PluginError>,
 }
 
+/// A period.
 impl FineLoop {
-    /// A loop at rest. `driver` is open and started; `kinematics` is `None` where joints are axes. Host; allocates.
-    pub fn new(
-        config: &FineConfig,
-        end: FineEnd,
-        driver: Box<dyn Driver>,
-        kinematics: Option<Box<dyn Kinematics>>,
-    ) -> Self {
-        let joints = joints::count(config, kinematics.as_deref());
-        Self {
-            config: *config,
-            drives: Drives::new(config, driver, joints),
-            space: JointSpace::new(config, kinematics),
-            controls: end.controls,
-            given: OperatorInputs::default(),
-            cause: StopCause::None,
-            status: end.status,
-            depth: end.depth,
-            samples: end.samples,
-            requests: end.requests,
-            rests: end.rests,
-            ratio: StrategyRatio::new(end.ratios, config.ratio_periods),
-            plan: PlanFollower::new(config, Cursor::new(end.segments, &config.position)),
-            line_moves: false,
-            guard: Guard::new(config),
-            edge: EdgeWatch::default(),
-            stop: None,
-            keep_alive: KeepAlive::default(),
-            missed: Missed::new(config),
-            progress: Progress::new(config),
-            roles: RoleWatch::default(),
-            spin_up: SpinUp::default(),
-            outputs: Outputs::new(config.dry_run, config.unhomed),
-            stays: false,
-            phase: Phase::Waiting,
-            state: MachineState::Fault,
-            queue: QueueWatch::default(),
-            tick: 0,
-            attach: Attach::new(config),
-            arm: Arm::default(),
-            release: Release::default(),
-            left: Left::default(),
-            counters: Counters::default(),
-            fault: None,
-            plugin_error: None,
-        }
-    }
-
     /// One fine period: fine thread, no allocation, bounded work.
     pub fn tick(&mut self) {
-        self.given = OperatorInputs::of(&self.controls);
-        // Nothing of this job is left to be aborted: what is asked now is meant for the one that is about to take over.
-        self.given.abort &= !self.outputs.ended;
-        self.cause = StopCause::None;
-        self.watch_jog();
-        self.take_requests();
+        let had_ended = self.outputs.ended;
+        self.operator.begin_period(had_ended);
+        self.stops.set_cause(StopCause::None);
+        self.counters.late_ratios += self.operator.take_requests(self.tick);
         self.watch_roles();
-        let ended = self.outputs.ended;
-        self.release.had_ended = ended;
+        self.release.begin_period(had_ended);
         let waiting = matches!(self.phase, Phase::Waiting);
-        let before_mm = self.plan.cursor.path_mm();
+        let before_mm = self.rate.cursor().path_mm();
         let (position, input) = self.next_position();
         let all_hold = self.exchange(&position);
         self.state = state::next(
@@ -193,175 +125,673 @@ impl FineLoop {
             input,
         );
         let started = !(waiting && matches!(self.phase, Phase::Waiting));
-        let recorded =
-            (self.outputs.unhomed == 0 || self.config.record_drives) && self.handed_over() == 0;
-        if started && recorded && !ended && !self.outputs.ended {
-            let feed = (self.plan.cursor.path_mm() - before_mm) / self.config.period_s;
+        let recorded = (self.outputs.unhomed == 0 || self.config.record_drives)
+            && self.phase.handed_over() == 0;
+        if started && recorded && !had_ended && !self.outputs.ended {
+            let feed = (self.rate.cursor().path_mm() - before_mm) / self.config.period_s;
             self.publish(&position, feed);
         }
-        self.keep_switched();
+        let switched = self.switched();
+        let segment = self.rate.cursor().segment();
+        self.report.keep_switched(self.tick, segment, &switched);
         self.tick += u64::from(started);
-        self.report();
+        let present = Present {
+            tick: self.tick,
+            state: self.state,
+            is_faulted: self.fault.is_some(),
+            waits_for_spindle: self.spin_up.waits(),
+            all_hold: self.actuation.all_hold(),
+        };
+        let drives = self.actuation.drives();
+        self.report
+            .tell(&present, &self.rate, drives, &self.counters);
     }
 
-    /// Hands samples out through another ring from here on. Host, before the first tick.
-    pub fn hand_out_through(&mut self, samples: Producer<Sample>) {
-        self.samples = samples;
-    }
-
-    /// Acknowledges a fault: the drives may be enabled. A machine starts faulted; one that has faulted since resets its drives,
-    /// enables them where they stand, and reports the rest there. Host, between ticks.
-    pub fn reset(&mut self) {
-        self.state = state::next(self.state, Input::Reset);
-        if matches!(self.phase, Phase::Faulted) {
-            self.attach = Attach::again(self.drives.feedback.position);
-            self.fault = None;
-            self.plugin_error = None;
-            self.space.lead = Lead::Axes;
-            self.release = Release::default();
-            self.plan.forget_rate(&self.config);
-            self.progress = Progress::new(&self.config);
-            self.forget_roles();
-            self.phase = Phase::Waiting;
+    /// Before a period: what the inputs with a role ask for in it.
+    fn watch_roles(&mut self) {
+        let (roles, drives) = (&self.config.roles, self.actuation.drives());
+        let Some(tripped) = self.roles.judge(roles, drives.feedback()) else {
+            return;
+        };
+        self.report.tell_tripped(tripped.all);
+        let stop_on = &self.rate.cursor().segment().stop_on;
+        let stays = || self.release.stays_enabled(self.operator.lets_drives_go());
+        let doing = Doing {
+            moves: matches!(self.phase, Phase::Following)
+                && drives.setpoint().velocity != AxisVector::ZERO,
+            homes: self.outputs.unhomed != 0,
+            holds: self.actuation.all_hold() && (!self.outputs.ended || stays()),
+            awaited: if stop_on.edge == Edge::None {
+                0
+            } else {
+                1 << stop_on.input.min(63)
+            },
+        };
+        if let Some(kind) = self.roles.fault(roles, &tripped, &doing) {
+            // What the operator's emergency stop switches off, that of an input does too, whatever has been a fault before.
+            if let FaultKind::Input {
+                role: InputFault::EmergencyStop,
+                ..
+            } = kind
+            {
+                self.operator.press_emergency_stop();
+            }
+            self.fail(kind);
         }
-    }
-
-    /// Number of the fine period that comes next: 0 until the first motion.
-    pub fn next_tick(&self) -> u64 {
-        self.tick
-    }
-
-    /// How much later than its bus wants it the last exchange was, ns; `None` as long as no driver tells. Fine thread.
-    pub fn phase_ns(&self) -> Option<i64> {
-        self.drives.phase_ns()
-    }
-
-    /// What was counted so far.
-    pub fn counters(&self) -> Counters {
-        self.counters
-    }
-
-    /// The fault, if there is one.
-    pub fn fault(&self) -> Option<Fault> {
-        self.fault
-    }
-
-    /// What the driver, or the kinematics, said when it failed first. Host.
-    pub fn plugin_error(&self) -> Option<&PluginError> {
-        self.plugin_error.as_ref()
-    }
-
-    /// Whether the program has ended, or a fault has brought the machine to rest, and the drives have let go.
-    pub fn is_over(&self) -> bool {
-        self.release.is_over
-    }
-
-    /// Whether the joints do not hold yet: nothing can move, and planning waits for them. Any side.
-    pub fn is_attaching(&self) -> bool {
-        !self.attach.is_done() && !self.is_over()
-    }
-
-    /// The driver, for what its codes mean. Host, between ticks.
-    pub fn driver(&self) -> &dyn Driver {
-        self.drives.driver()
-    }
-
-    /// Whether the driver did not reach the drive of some joint in the last exchange. Host.
-    pub fn has_lost_joints(&self) -> bool {
-        self.drives.feedback.state[..self.drives.joints].contains(&JointState::Lost)
-    }
-
-    /// What was switched last. The period that ends a program switches, and has no sample. Host.
-    pub fn left(&self) -> Left {
-        self.left
-    }
-
-    /// Hands the driver back. Host.
-    pub fn into_driver(self) -> Box<dyn Driver> {
-        self.drives.into_driver()
+        // The spindle of an open door is off, whatever the axes do.
+        if self.roles.opens_door(&self.config.roles, &tripped) {
+            self.outputs.switch_by_door();
+        }
+        if self.fault.is_some() || !self.actuation.all_hold() || self.outputs.ended {
+            return;
+        }
+        if self.roles.asks_for_hold(&self.config.roles, &tripped) {
+            self.operator.hold();
+        }
+        // Where the operator has resumed, what was switched off comes first.
+        if !self.operator.inputs().hold && self.roles.resume() {
+            self.outputs.switch_by_door();
+            self.spin_up = SpinUp::begin();
+        }
     }
 
     fn next_position(&mut self) -> (AxisVector, Input) {
-        if self.given.emergency_stop {
+        if self.operator.inputs().emergency_stop {
             // Also where another fault is being ramped out: it may be why somebody presses it.
             self.outputs
                 .switch_off(self.config.kept_outputs, SwitchedBy::EmergencyStop);
             self.fail(FaultKind::EmergencyStop);
         }
         match &mut self.phase {
-            Phase::Waiting => (*self.guard.position(), self.wait()),
+            Phase::Waiting => (self.actuation.position(), self.wait()),
             Phase::Following => self.follow(),
             Phase::AwaitingReplan => (self.stand(), self.await_replan()),
             Phase::HandedOver(hand) => {
                 let hand = *hand;
-                self.hand_over(hand)
+                let input = self.watch_hand(hand);
+                (self.stand(), input)
             }
             Phase::Ramping(ramp) => {
-                self.cause = StopCause::Fault;
+                self.stops.set_cause(StopCause::Fault);
                 let (mut position, over) = (ramp.next(), ramp.is_over());
                 self.add_joints(&mut position);
-                let over = over && self.joints_rest();
-                (
-                    self.ramp_out(position, over),
-                    if over { Input::Stopped } else { Input::Trip },
-                )
+                let over = over && self.actuation.joints_rest(&self.config);
+                self.ramp_out(&position, over);
+                (position, if over { Input::Stopped } else { Input::Trip })
             }
             Phase::Faulted => {
-                self.cause = StopCause::Fault;
-                (*self.guard.position(), Input::Stopped)
+                self.stops.set_cause(StopCause::Fault);
+                (self.actuation.position(), Input::Stopped)
             }
         }
     }
 
+    fn stand(&mut self) -> AxisVector {
+        self.actuation.stand(self.outputs.unhomed)
+    }
+
     /// Motion starts when the drives hold and enough is queued.
     fn wait(&mut self) -> Input {
-        if self.controls.soft_fault.load(Relaxed) {
-            self.fail(FaultKind::Soft);
+        if self.fails_with_soft_side() {
             return Input::Trip;
         }
-        if self.given.abort && !self.attach.is_done() {
+        let aborts = self.operator.inputs().abort;
+        if aborts && !self.actuation.all_hold() {
             return self.give_up_enabling();
         }
         if self.state != MachineState::Standstill {
             return Input::Rest;
         }
-        if self.given.abort || self.is_jog_let_go() {
-            return self.end_epoch(Stop::abort());
+        if aborts || self.operator.is_jog_let_go() {
+            return self.end_epoch(Stop::of(RestCause::Abort));
         }
-        let of_this_epoch = self.plan.cursor.epoch() == 0
-            || (self.depth.is_of(self.plan.cursor.epoch()) && self.plan.cursor.drop_older());
-        if of_this_epoch && self.depth.may_start(self.plan.cursor.program_time_s()) {
+        if self.rate.may_start() {
             self.phase = Phase::Following;
         }
         Input::Rest
     }
 
-    fn ramp_out(&mut self, position: AxisVector, over: bool) -> AxisVector {
-        self.guard.check(&position, self.outputs.unhomed);
-        self.guard.sent(&position);
-        if over {
-            if self.outputs.by != SwitchedBy::EmergencyStop {
-                self.outputs
-                    .switch_off(self.config.kept_outputs, SwitchedBy::Fault);
-            }
-            self.drives.quick_stop();
-            self.phase = Phase::Faulted;
+    /// The operator aborts before the joints hold: they are not told to any more, and nothing follows.
+    fn give_up_enabling(&mut self) -> Input {
+        let input = self.end_epoch(Stop::of(RestCause::Abort));
+        if matches!(self.phase, Phase::AwaitingReplan) {
+            self.outputs.ended = true;
+            self.release.begin();
         }
-        position
+        input
     }
 
+    /// Motion starts again when the rough loop has taken the report and enough of the new epoch is queued.
+    fn await_replan(&mut self) -> Input {
+        if self.fails_with_soft_side() {
+            return Input::Trip;
+        }
+        if self.outputs.ended {
+            return Input::Rest;
+        }
+        if self.operator.inputs().abort {
+            return self.end_epoch(Stop::of(RestCause::Abort));
+        }
+        if self.rate.may_go_on() && self.state == MachineState::Standstill {
+            self.phase = Phase::Following;
+        }
+        Input::Rest
+    }
+
+    /// Where nothing moves along the plan, a failure of the soft side is a fault at once.
+    fn fails_with_soft_side(&mut self) -> bool {
+        let has_failed = self.operator.has_soft_fault();
+        if has_failed {
+            self.fail(FaultKind::Soft);
+        }
+        has_failed
+    }
+}
+
+/// Following the plan.
+impl FineLoop {
+    /// Follows the plan for one period.
+    fn follow(&mut self) -> (AxisVector, Input) {
+        self.counters.late_ratios += self.rate.take_ratios(self.tick);
+        self.look_for_stop();
+        let single_block = self.operator.inputs().single_block;
+        if self.rate.is_between_lines(single_block) {
+            self.operator.hold();
+        }
+        let ask = self.ask();
+        if let Some(kind) = self.spin_up.fault(self.actuation.drives(), &self.config) {
+            self.fail(kind);
+            return self.next_position();
+        }
+        self.stops.set_cause(self.cause_of(ask));
+        self.rate.begin_at_rest(ask);
+        if ask == Ask::Hold && self.rate.sigma() == 0.0 && self.fails_with_soft_side() {
+            return (self.actuation.position(), Input::Trip);
+        }
+        if let Some(stop) = self.stops.stop().filter(|_| self.rate.stands()) {
+            return (self.stand(), self.end_epoch(stop));
+        }
+        if ask == Ask::Run {
+            if let Some(input) = self.begin_hand_over() {
+                return (self.actuation.position(), input);
+            }
+            let next = self.rate.next_stop_on();
+            if next.is_some_and(|stop_on| self.stops.arm_for(&stop_on)) {
+                return (self.stand(), Input::Run);
+            }
+        }
+        let delta_s = self.govern(ask, single_block);
+        let reached = self.advance(delta_s);
+        let inputs = self.operator.inputs();
+        let late = self
+            .rate
+            .watch_progress(ask, reached, &self.config, &self.outputs, inputs);
+        if let Some(kind) = late {
+            self.fail(kind);
+        }
+        let (cursor, drives) = (self.rate.cursor(), self.actuation.drives());
+        self.stops
+            .begin_edge(cursor.segment(), drives, &self.config);
+        let mut position = cursor.position();
+        self.add_joints(&mut position);
+        let checked = self.actuation.check(&position, self.outputs.unhomed);
+        self.counters.jerk_relaxed_samples += u64::from(checked.relaxed);
+        let position = self.let_pass(position, &checked);
+        (position, self.input(ask, reached))
+    }
+
+    /// An abort, a jog that is let go, axes whose position is set anew, or a motion that ended without its edge.
+    fn look_for_stop(&mut self) {
+        let cursor = self.rate.cursor();
+        if self.operator.inputs().abort {
+            self.stops.ask(RestCause::Abort);
+        } else if self.operator.is_jog_let_go() {
+            self.stops.ask_first(RestCause::Abort);
+        } else if cursor.is_resting() {
+            if let Some(by) = self.outputs.correction.take() {
+                self.actuation.correct(&by);
+                self.stops.ask(RestCause::Corrected);
+            } else if cursor.segment().stop_on.edge != Edge::None {
+                self.stops.ask_first(RestCause::Missed);
+            }
+        }
+    }
+
+    /// What is asked of the rate of program time, before ratios.
+    fn ask(&mut self) -> Ask {
+        self.spin_up.begin_period();
+        if std::mem::take(&mut self.outputs.stop_requested) {
+            self.operator.hold_for_program();
+        }
+        let starves = self.rate.look_at_queue(self.config.period_s);
+        self.counters.starvations += u64::from(starves);
+        if self.operator.is_held() || self.operator.has_soft_fault() {
+            return Ask::Hold;
+        }
+        if self.stops.stop().is_some() {
+            return Ask::Stop;
+        }
+        if self.rate.is_starved() {
+            return Ask::Starve;
+        }
+        let stands_inside = self.rate.stands_inside();
+        let drives = self.actuation.drives();
+        let is_cutting = || self.rate.is_cutting();
+        if self
+            .spin_up
+            .look(drives, &self.config, stands_inside, is_cutting)
+        {
+            Ask::Hold
+        } else {
+            Ask::Run
+        }
+    }
+
+    /// Why the rate of program time is to go down: what lasts longest comes first.
+    fn cause_of(&self, ask: Ask) -> StopCause {
+        match (ask, self.stops.stop().map(|stop| stop.cause)) {
+            (Ask::Run, _) => StopCause::None,
+            _ if self.operator.has_soft_fault() => StopCause::SoftFault,
+            (_, Some(RestCause::Abort)) => StopCause::Abort,
+            (_, Some(RestCause::Edge | RestCause::Already)) => StopCause::Edge,
+            (Ask::Hold, _) if self.operator.inputs().hold => self.roles.cause_of_hold(),
+            (Ask::Hold, _) if self.spin_up.waits() => StopCause::Spindle,
+            (Ask::Hold, _) => StopCause::ProgramStop,
+            (Ask::Stop, _) => StopCause::None,
+            (Ask::Starve, _) => StopCause::Starvation,
+        }
+    }
+
+    fn ratios_in_force(&self) -> Ratios {
+        self.rate
+            .ratios_in_force(&self.config, &self.outputs, self.operator.inputs())
+    }
+
+    /// Chooses the rate for this period; gives the program time that passes, s.
+    fn govern(&mut self, ask: Ask, single_block: bool) -> f64 {
+        let ratios = self.ratios_in_force();
+        let governed = self.rate.govern(ask, ratios, single_block);
+        self.counters.queue_limited_samples += u64::from(governed.is_queue_limited);
+        self.counters.governed_samples += u64::from(governed.is_unasked);
+        if governed.is_jerk_relaxed {
+            self.actuation.relax_jerk();
+        }
+        if governed.holds {
+            self.operator.hold_from_next_period();
+        }
+        governed.delta_s
+    }
+
+    /// Moves on by `delta_s` of program time, and switches what is met on the way.
+    fn advance(&mut self, delta_s: f64) -> Reached {
+        // Which words wait for the operator now.
+        let waits = Waits {
+            program: self.config.pause_at_stops && !self.config.dry_run,
+            optional: self.operator.inputs().optional_stop && !self.config.dry_run,
+        };
+        self.rate.advance(delta_s, |queued| {
+            let event = match queued {
+                Queued::Segment { segment, .. } => {
+                    return self.spin_up.is_awaited() && is_cut(segment);
+                }
+                Queued::Event(event) => event,
+            };
+            let told_rad_per_s = self.outputs.spindle_rad_per_s;
+            self.outputs.apply(event, waits);
+            if self.outputs.spindle_rad_per_s != told_rad_per_s {
+                self.spin_up = SpinUp::begin();
+            }
+            // At home one sample rests, so that a record begins with it.
+            let homing = matches!(
+                event.kind,
+                EventKind::Correct | EventKind::Homed | EventKind::HomeByDrive
+            );
+            self.outputs.stop_requested || homing
+        })
+    }
+
+    fn let_pass(&mut self, position: AxisVector, checked: &Checked) -> AxisVector {
+        if matches!(self.phase, Phase::Ramping(_)) {
+            // The kinematics have no joints for this sample: the ramp starts from the one before.
+            return self.next_position().0;
+        }
+        match (checked.breach, self.config.guard) {
+            (Some(breach), GuardMode::Stop) => {
+                self.counters.guard_stops += 1;
+                self.fail(breach);
+                self.next_position().0
+            }
+            (breach, _) => {
+                self.counters.limit_violations += u64::from(breach.is_some() || checked.relaxed);
+                self.actuation.send(&position);
+                position
+            }
+        }
+    }
+
+    fn input(&self, ask: Ask, reached: Reached) -> Input {
+        match (&self.phase, ask) {
+            (Phase::Ramping(_), _) => Input::Trip,
+            (Phase::Faulted, _) => Input::Stopped,
+            (_, Ask::Hold | Ask::Stop) => Input::Hold,
+            (_, Ask::Starve) => Input::Starve,
+            _ if reached == Reached::Rest && self.rate.cursor().is_last() => Input::Rest,
+            _ => Input::Run,
+        }
+    }
+
+    /// At rest: reports it and ends the epoch. Where the reports before have not been taken yet, it waits for that.
+    fn end_epoch(&mut self, stop: Stop) -> Input {
+        let latch = stop.latch.map(|joints| self.axes_of(&joints));
+        let position = self.actuation.position();
+        let cursor = self.rate.cursor();
+        let is_reported = self.stops.report(Rest {
+            epoch: cursor.epoch(),
+            cause: stop.cause,
+            tick: self.tick,
+            block: cursor.segment().block,
+            line: cursor.segment().line,
+            stop_on: cursor.segment().stop_on,
+            position: self.config.axes_alone(&position),
+            latch,
+            program_time_s: cursor.program_time_s(),
+            path_mm: cursor.path_mm(),
+        });
+        if !is_reported {
+            return Input::Hold;
+        }
+        self.rate.end_epoch(&position);
+        self.phase = Phase::AwaitingReplan;
+        // A jog that is let go leaves a hold as it is: the next one waits for its end too. An abort that comes while the joints
+        // are enabled is still to act.
+        if self.operator.inputs().abort && stop.cause != RestCause::Attached {
+            self.outputs.abort();
+            self.operator.forget_abort();
+        }
+        Input::Rest
+    }
+}
+
+/// Homing by the drives.
+impl FineLoop {
+    /// At a rest: hands the joint over that an event has named.
+    fn begin_hand_over(&mut self) -> Option<Input> {
+        if !self.rate.cursor().is_resting() {
+            return None;
+        }
+        let (joint, within_s) = self.outputs.hand_over.take()?;
+        let drives = self.actuation.drives();
+        if joint >= drives.joints() {
+            return None;
+        }
+        self.phase = Phase::HandedOver(HandOver::begin(joint, within_s, drives));
+        Some(Input::Run)
+    }
+
+    /// What one period of a joint in its drive's hands is to the machine's state.
+    fn watch_hand(&mut self, mut hand: HandOver) -> Input {
+        let is_held = self.operator.is_held();
+        let gives_up = self.operator.inputs().abort || self.operator.is_jog_let_go();
+        let period_s = self.config.period_s;
+        let found = self
+            .actuation
+            .look_at_hand(&mut hand, period_s, is_held, gives_up);
+        match found {
+            Found::Homed => {
+                self.take_back(hand.joint());
+                self.end_epoch(Stop::of(RestCause::Corrected))
+            }
+            Found::GivenUp => {
+                self.take_back(hand.joint());
+                self.end_epoch(Stop::of(RestCause::Abort))
+            }
+            Found::Late(kind) => {
+                self.fail(kind);
+                Input::Trip
+            }
+            Found::Goes if self.fails_with_soft_side() => Input::Trip,
+            Found::Goes => {
+                self.phase = Phase::HandedOver(hand);
+                if is_held { Input::Hold } else { Input::Run }
+            }
+        }
+    }
+
+    /// The machine stands where the drive says that its joint is.
+    fn take_back(&mut self, joint: usize) {
+        let joints = self.actuation.take_back(&self.config, joint);
+        self.stand_at(&joints);
+        self.actuation.forget_way(&joints);
+    }
+}
+
+/// Joints and drives.
+impl FineLoop {
+    /// What was sent last.
+    fn switched(&self) -> Switched {
+        let setpoint = self.actuation.drives().setpoint();
+        Switched {
+            outputs: setpoint.outputs,
+            spindle_rad_per_s: setpoint.spindle_rad_per_s,
+            by: self.outputs.by,
+        }
+    }
+
+    /// Whether the drives are to let go: the program had ended before this period and no other job may follow, or a fault has
+    /// brought the machine to rest.
+    fn is_letting_go(&self) -> bool {
+        self.release.is_due(self.operator.lets_drives_go()) || matches!(self.phase, Phase::Faulted)
+    }
+
+    /// Exchanges setpoints and feedback with the drives. Returns whether all joints hold afterwards.
+    fn exchange(&mut self, axes: &AxisVector) -> bool {
+        let lets_go = self.is_letting_go();
+        let may_hold =
+            self.fault.is_none() && !lets_go && self.roles.may_enable(&self.config.roles);
+        let hand = self.phase.hand();
+        self.actuation
+            .set_joints(&self.config, axes, hand, may_hold, lets_go);
+        let told = Told {
+            arm: self.stops.arm(),
+            // Where axes are homed, joints are axes.
+            limited: self.outputs.unhomed & self.config.homing_limits,
+            outputs: self.outputs.bits,
+            spindle_rad_per_s: if self.roles.is_door_open() {
+                0.0
+            } else {
+                self.outputs.spindle_rad_per_s
+            },
+        };
+        let exchanged = self
+            .actuation
+            .exchange(self.tick, &told, &mut self.plugin_error);
+        let drives = self.actuation.drives();
+        self.roles.hear(exchanged.failed);
+        self.spin_up.hear(drives, &self.config);
+        self.counters.old_feedback_periods += u64::from(exchanged.age_periods > 0);
+        self.report
+            .tell_bus(drives.feedback(), exchanged.age_periods);
+        // What is true nearly always is looked at first.
+        if exchanged.failed
+            || exchanged.unreadable.is_some()
+            || !exchanged.all_hold
+            || drives.judges_following()
+        {
+            let moving = matches!(
+                self.phase,
+                Phase::Following | Phase::AwaitingReplan | Phase::HandedOver(_)
+            );
+            let own = self.phase.handed_over();
+            let fault =
+                self.actuation
+                    .fault_of_answer(&self.config, &exchanged, moving, own, lets_go);
+            if let Some(kind) = fault {
+                self.fail(kind);
+            }
+        }
+        if !self.actuation.all_hold() && self.fault.is_none() && !lets_go {
+            self.watch_attach();
+        }
+        if matches!(self.phase, Phase::Following) {
+            let stop_on = &self.rate.cursor().segment().stop_on;
+            self.stops
+                .watch_edge(stop_on, self.actuation.drives(), &self.config);
+        }
+        if lets_go {
+            let max_periods = self.config.disable_periods;
+            self.release
+                .watch(self.actuation.drives(), exchanged.failed, max_periods);
+        }
+        exchanged.all_hold
+    }
+
+    /// After an exchange with joints that do not all hold: where they do now, the machine stands where they are, and planning starts
+    /// from there.
+    fn watch_attach(&mut self) {
+        match self.actuation.watch_attach(self.config.enable_periods) {
+            Watched::Goes => return,
+            Watched::Late(kind) => return self.fail(kind),
+            Watched::AllHold => {}
+        }
+        if let Some(joints) = self.actuation.found_elsewhere(&self.config) {
+            self.stand_at(&joints);
+        }
+        if self.fault.is_none() && self.config.plans_from_rest {
+            self.end_epoch(Stop::of(RestCause::Attached));
+            // Ticks are counted from the first motion on.
+            self.phase = Phase::Waiting;
+        }
+    }
+
+    /// What the drives do for the state of the machine, where `all_hold` or not all of them do.
+    fn input_of_drives(&self, all_hold: bool) -> Input {
+        let own = self.phase.handed_over();
+        if all_hold || self.actuation.drives().hold_others_than(own) {
+            Input::DrivesOn
+        } else {
+            Input::DrivesOff
+        }
+    }
+
+    /// A sample on its way to the guard gets the joints behind the axes.
+    #[inline]
+    fn add_joints(&mut self, position: &mut AxisVector) {
+        let after_fault = self.fault.is_some();
+        if let Some(kind) = self
+            .actuation
+            .add_joints(&self.config, after_fault, position)
+        {
+            self.lose_way(kind);
+        }
+    }
+
+    /// Axis coordinates of what the drives report, mm or rad. Where the kinematics do not know, the last ones, and a fault.
+    #[inline]
+    fn axes_of(&mut self, joints: &AxisVector) -> AxisVector {
+        match self.actuation.axes_of(&self.config, joints) {
+            Ok(axes) => axes,
+            Err(kind) => {
+                self.lose_way(kind);
+                *self.actuation.space().last_axes()
+            }
+        }
+    }
+
+    /// Takes the place of `joints` as that of the axes; what a joint is beside them, such as one of a gantry, it keeps.
+    fn stand_at(&mut self, joints: &AxisVector) {
+        let axes = self.axes_of(joints);
+        let mut position = self.config.axes_alone(&axes);
+        match self.config.joints {
+            Joints::Axes => {}
+            Joints::Sums(lanes) => lanes.fill(&mut position),
+            Joints::Curved { .. } => self.add_joints(&mut position),
+        }
+        self.actuation.place(&self.config, joints, &position);
+    }
+
+    fn publish(&mut self, command: &AxisVector, feed_mm_per_s: f64) {
+        let reported = self.actuation.drives().feedback().position;
+        let (command, feedback) = if self.config.record_drives {
+            (*command + *self.actuation.space().offset(), reported)
+        } else {
+            (self.config.axes_alone(command), self.axes_of(&reported))
+        };
+        let ratio = self.ratios_in_force().feed;
+        let (drives, switched) = (self.actuation.drives(), self.switched());
+        let (answer, segment) = (drives.feedback(), self.rate.cursor().segment());
+        let given = self.operator.inputs();
+        self.counters.samples += 1;
+        self.report.publish(|| Sample {
+            tick: self.tick,
+            block: segment.block,
+            line: segment.line,
+            state: self.state,
+            command,
+            feedback,
+            speed: answer.speed,
+            current_a: answer.current_a,
+            feed_mm_per_s,
+            end_feed_mm_per_s: self.rate.end_feed_mm_per_s(),
+            programmed_feed_mm_per_s: segment.feed_mm_per_s,
+            sigma: self.rate.sigma(),
+            ratio,
+            feed_override: self.outputs.permitted_override(given),
+            spindle_rad_per_s: answer.spindle_rad_per_s,
+            switched,
+            phase_ns: drives.phase_ns(),
+            analog: answer.analog,
+            inputs: answer.inputs,
+            old_inputs: answer::old_inputs(answer),
+            age_periods: answer::ages(answer, drives.joints()),
+            cause: self.stops.cause(),
+            given: *given,
+        });
+    }
+}
+
+/// Faults.
+impl FineLoop {
     /// Goes into the fault reaction: the first cause counts.
     fn fail(&mut self, kind: FaultKind) {
         if self.fault.is_some() {
             return;
         }
-        self.end_hand_over();
-        self.arm = Arm::default();
+        // What a drive has in its hands is taken back as it is.
+        if let Phase::HandedOver(hand) = &self.phase {
+            let joint = hand.joint();
+            self.phase = Phase::AwaitingReplan;
+            self.take_back(joint);
+        }
+        self.stops.disarm();
         self.fault = Some(Fault {
             kind,
             tick: self.tick,
-            line: self.plan.cursor.segment().line,
+            line: self.rate.cursor().segment().line,
         });
-        self.phase = Phase::Ramping(Ramp::new(&self.config, &self.guard));
+        self.phase = Phase::Ramping(Ramp::new(&self.config, self.actuation.guard()));
+    }
+
+    /// The kinematics do not know the way; the plugin's own words about it are kept for the host.
+    #[cold]
+    fn lose_way(&mut self, kind: FaultKind) {
+        if self.fault.is_none()
+            && let Some(error) = self.actuation.space().error()
+        {
+            self.plugin_error.get_or_insert(error);
+        }
+        self.fail(kind);
+    }
+
+    fn ramp_out(&mut self, position: &AxisVector, over: bool) {
+        self.actuation.check(position, self.outputs.unhomed);
+        self.actuation.send(position);
+        if over {
+            if self.outputs.by != SwitchedBy::EmergencyStop {
+                self.outputs
+                    .switch_off(self.config.kept_outputs, SwitchedBy::Fault);
+            }
+            self.actuation.quick_stop();
+            self.phase = Phase::Faulted;
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! The drives as the loop knows them: what they were told last, and what they have answered.
 
-use tandem_sdk::{Attached, AxisVector, Driver, Feedback, JointState, PluginError, Setpoint};
+use tandem_sdk::{Arm, Attached, AxisVector, Driver, Feedback, JointState, PluginError, Setpoint};
 
 use crate::answer::{self, Numbers};
 use crate::config::FineConfig;
@@ -19,17 +19,29 @@ pub(super) struct Exchanged {
     pub(super) age_periods: u32,
 }
 
+/// What the drives are told beside where their joints are to be.
+pub(super) struct Told {
+    /// What they are to catch.
+    pub(super) arm: Arm,
+    /// Bit per joint whose drive keeps to a torque limit.
+    pub(super) limited: u32,
+    /// Digital outputs.
+    pub(super) outputs: u64,
+    /// Speed of the spindle, rad/s.
+    pub(super) spindle_rad_per_s: f64,
+}
+
 /// The drives of the joints.
 pub(super) struct Drives {
     driver: Box<dyn Driver>,
     /// Number of joints.
-    pub(super) joints: usize,
-    pub(super) setpoint: Setpoint,
-    pub(super) feedback: Feedback,
+    joints: usize,
+    setpoint: Setpoint,
+    feedback: Feedback,
     /// Where the joints were told to be in the last periods, where some joint has a limit of its following error.
-    pub(super) sent: Option<History>,
+    sent: Option<History>,
     /// Where they were.
-    pub(super) measured: History,
+    measured: History,
     /// The drives hear their heartbeat from the job before: the setpoint's tick goes on from there, in every exchange.
     beats_on: bool,
 }
@@ -52,6 +64,73 @@ impl Drives {
             measured: History::new(&position),
             beats_on: false,
         }
+    }
+
+    /// Number of joints.
+    pub(super) fn joints(&self) -> usize {
+        self.joints
+    }
+
+    /// What they were told last.
+    pub(super) fn setpoint(&self) -> &Setpoint {
+        &self.setpoint
+    }
+
+    /// What they have answered last.
+    pub(super) fn feedback(&self) -> &Feedback {
+        &self.feedback
+    }
+
+    /// The state of each joint's drive.
+    pub(super) fn states(&self) -> &[JointState] {
+        &self.feedback.state[..self.joints]
+    }
+
+    /// Where the joints were in the last periods.
+    pub(super) fn measured(&self) -> &History {
+        &self.measured
+    }
+
+    /// Whether some joint has a limit of its following error.
+    pub(super) fn judges_following(&self) -> bool {
+        self.sent.is_some()
+    }
+
+    /// The fault that their last answer is, of joints that move or are to hold where `moving`; those of the mask `own` have
+    /// something else to do.
+    pub(super) fn reported(&self, moving: bool, own: u32) -> Option<FaultKind> {
+        answer::reported(&self.feedback, self.joints, moving, own)
+    }
+
+    /// The joint, not one of `own`, that is too far from where it was told to be, as a fault.
+    pub(super) fn too_far(&self, config: &FineConfig, own: u32) -> Option<FaultKind> {
+        answer::following(
+            &self.feedback,
+            (self.sent.as_ref()?, &config.attached.delay_periods),
+            self.joints,
+            &config.max_following_error_mm,
+            own,
+        )
+    }
+
+    /// Puts into the setpoint what it holds beside positions.
+    #[inline]
+    pub(super) fn tell(&mut self, told: &Told) {
+        self.setpoint.arm = told.arm;
+        self.setpoint.limited = told.limited;
+        self.setpoint.outputs = told.outputs;
+        self.setpoint.spindle_rad_per_s = told.spindle_rad_per_s;
+    }
+
+    /// Puts into the setpoint whether the drives are to hold, and whether their faults are to be reset.
+    pub(super) fn tell_to_hold(&mut self, holds: bool, resets: bool) {
+        self.setpoint.enable = u32::from(holds);
+        self.setpoint.reset = u32::from(resets);
+    }
+
+    /// Puts into the setpoint which joints their drives are to home, a bit each.
+    pub(super) fn tell_to_home(&mut self, joints: u32) {
+        self.setpoint.homing = joints;
     }
 
     /// Sends the setpoint, in fine period `tick`, and takes the feedback. The first words of a plugin that fails are kept in

@@ -1,14 +1,9 @@
 //! A joint that its drive homes: handed over at rest, neither followed nor judged, and taken back where the drive says it is.
 
-use std::sync::atomic::Ordering::Relaxed;
-
-use tandem_rings::RestCause;
 use tandem_sdk::{AxisVector, JointState};
 
-use super::rest::Stop;
-use super::{FineLoop, Phase};
+use super::drives::Drives;
 use crate::fault::FaultKind;
-use crate::state::Input;
 
 /// A joint in its drive's hands.
 #[derive(Clone, Copy, Debug)]
@@ -28,122 +23,84 @@ pub(super) struct HandOver {
     held: bool,
 }
 
-impl FineLoop {
-    /// At a rest: hands the joint over that an event has named.
-    pub(super) fn begin_hand_over(&mut self) -> Option<Input> {
-        let (joint, within_s) = self
-            .outputs
-            .hand_over
-            .filter(|_| self.plan.cursor.is_resting())?;
-        self.outputs.hand_over = None;
-        if joint >= self.drives.joints {
-            return None;
-        }
-        let begun = self.drives.feedback.homed >> joint & 1 == 0;
-        let (periods, given_up, told, held) = (0, false, false, false);
-        self.phase = Phase::HandedOver(HandOver {
+/// What has become of a joint in its drive's hands.
+pub(super) enum Found {
+    /// The drive says where it is.
+    Homed,
+    /// It holds, and is not homed: the operator has aborted.
+    GivenUp,
+    /// It has taken longer than it may.
+    Late(FaultKind),
+    /// The drive goes on.
+    Goes,
+}
+
+impl HandOver {
+    /// Hands `joint` over to its drive, which has `within_s` for it.
+    pub(super) fn begin(joint: usize, within_s: f64, drives: &Drives) -> Self {
+        Self {
             joint,
             within_s,
-            periods,
-            begun,
-            given_up,
-            told,
-            held,
-        });
-        Some(Input::Run)
+            periods: 0,
+            begun: drives.feedback().homed >> joint & 1 == 0,
+            given_up: false,
+            told: false,
+            held: false,
+        }
     }
 
-    /// One period of a joint in its drive's hands: where the axes stand, by the plan, and what it is to the machine's state.
-    pub(super) fn hand_over(&mut self, hand: HandOver) -> (AxisVector, Input) {
-        let input = self.look_at_hand(hand);
-        (self.stand(), input)
+    /// The joint.
+    pub(super) fn joint(&self) -> usize {
+        self.joint
     }
 
-    fn look_at_hand(&mut self, mut hand: HandOver) -> Input {
-        let (bit, state) = (1_u32 << hand.joint, self.drives.feedback.state[hand.joint]);
-        let is_new = self.drives.feedback.age_periods[hand.joint] == 0;
-        hand.begun |=
-            is_new && (state == JointState::Homing || self.drives.feedback.homed & bit == 0);
-        let homed = hand.told && hand.begun && self.drives.feedback.homed & bit != 0;
-        hand.given_up |= self.given.abort || self.is_jog_let_go();
-        if is_new && state == JointState::Enabled && (homed || hand.given_up) {
-            self.take_back(hand.joint);
-            return self.end_epoch(if hand.given_up {
-                Stop::abort()
+    /// One period more, in which the operator holds it (`is_held`) or wants it back (`gives_up`).
+    pub(super) fn look(
+        &mut self,
+        drives: &mut Drives,
+        period_s: f64,
+        is_held: bool,
+        gives_up: bool,
+    ) -> Found {
+        let feedback = drives.feedback();
+        let (bit, state) = (1_u32 << self.joint, feedback.state[self.joint]);
+        let is_new = feedback.age_periods[self.joint] == 0;
+        self.begun |= is_new && (state == JointState::Homing || feedback.homed & bit == 0);
+        let homed = self.told && self.begun && feedback.homed & bit != 0;
+        self.given_up |= gives_up;
+        if is_new && state == JointState::Enabled && (homed || self.given_up) {
+            return if self.given_up {
+                Found::GivenUp
             } else {
-                Stop::of(RestCause::Corrected)
-            });
+                Found::Homed
+            };
         }
         // Holds and doors interrupt the drive's own motion; it begins anew when they are over.
-        let held = self.given.hold || self.given.program_hold;
-        hand.told = !hand.given_up && !held;
-        hand.periods += u64::from(!held);
-        self.drives.setpoint.homing = if hand.told { bit } else { 0 };
-        if hand.periods as f64 * self.config.period_s > hand.within_s {
-            let (joint, within_s, code) = (
-                hand.joint,
-                hand.within_s,
-                self.drives.feedback.fault_code[hand.joint],
-            );
-            self.fail(FaultKind::NotHomed {
-                joint,
+        self.told = !self.given_up && !is_held;
+        self.periods += u64::from(!is_held);
+        let code = feedback.fault_code[self.joint];
+        drives.tell_to_home(if self.told { bit } else { 0 });
+        if self.periods as f64 * period_s > self.within_s {
+            return Found::Late(FaultKind::NotHomed {
+                joint: self.joint,
                 state,
                 code,
-                within_s,
+                within_s: self.within_s,
             });
-            return Input::Trip;
         }
-        if self.controls.soft_fault.load(Relaxed) {
-            self.fail(FaultKind::Soft);
-            return Input::Trip;
-        }
-        self.phase = Phase::HandedOver(hand);
-        if held { Input::Hold } else { Input::Run }
+        Found::Goes
     }
 
-    /// Before a fault: what a drive has in its hands is taken back as it is.
-    pub(super) fn end_hand_over(&mut self) {
-        if let Phase::HandedOver(hand) = &self.phase {
-            let joint = hand.joint;
-            self.phase = Phase::AwaitingReplan;
-            self.take_back(joint);
-        }
-    }
-
-    /// Joints in their drives' hands, a bit each.
-    pub(super) fn handed_over(&self) -> u32 {
-        if let Phase::HandedOver(hand) = &self.phase {
-            1 << hand.joint
+    /// Puts the joint where it is among `joints`: that is no motion of the plan. Where its drive is interrupted and holds it, it
+    /// stays, so that it does not sink.
+    pub(super) fn place(&mut self, drives: &Drives, joints: &mut AxisVector) {
+        let holds = !self.told && drives.feedback().state[self.joint] == JointState::Enabled;
+        let position = if holds && self.held {
+            &drives.setpoint().position
         } else {
-            0
-        }
-    }
-
-    /// What the joints are told: the one in its drive's hands is where it is, and that is no motion of the plan. Where its drive
-    /// is interrupted and holds it, it stays, so that it does not sink.
-    pub(super) fn hold_the_others(&mut self, axes: &AxisVector) -> AxisVector {
-        let mut joints = self.joints_of(axes);
-        if let Phase::HandedOver(hand) = &mut self.phase {
-            let joint = hand.joint;
-            let holds = !hand.told && self.drives.feedback.state[joint] == JointState::Enabled;
-            let stays = holds && hand.held;
-            joints[joint] = if stays {
-                self.drives.setpoint.position[joint]
-            } else {
-                self.drives.feedback.position[joint]
-            };
-            hand.held = holds;
-        }
-        joints
-    }
-
-    /// The machine stands where the drive says that its joint is. What was sent before is no way from there to here.
-    fn take_back(&mut self, joint: usize) {
-        self.drives.setpoint.homing = 0;
-        let mut joints = self.joints_of(self.guard.position());
-        joints[joint] = self.drives.feedback.position[joint];
-        self.space.offset[joint] = 0.0;
-        self.stand_at(&joints);
-        self.drives.forget_way(&joints);
+            &drives.feedback().position
+        };
+        joints[self.joint] = position[self.joint];
+        self.held = holds;
     }
 }

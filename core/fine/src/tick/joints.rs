@@ -2,9 +2,9 @@
 
 use tandem_sdk::{AxisVector, Kinematics, PluginError};
 
-use super::FineLoop;
 use crate::config::{FineConfig, Joints};
 use crate::fault::FaultKind;
+use crate::guard::Guard;
 
 /// Relative rounding of a speed that a limit forgives.
 const ROUNDING: f64 = 5e-7;
@@ -14,7 +14,7 @@ const BACK: f64 = 1e-6;
 
 /// What leads the joints where the kinematics are not linear.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Lead {
+enum Lead {
     /// The axes, by the kinematics.
     Axes,
     /// Nothing, after a fault: each goes to rest on its own, and the kinematics are not asked.
@@ -34,10 +34,10 @@ pub(super) struct JointSpace {
     /// `None` where joints are axes.
     kinematics: Option<Box<dyn Kinematics>>,
     /// What the drives are sent beyond the axes' coordinates: homing has found it, mm or rad per joint.
-    pub(super) offset: AxisVector,
+    offset: AxisVector,
     /// Where the axes are by the feedback, as far as the kinematics last knew.
-    pub(super) axes: AxisVector,
-    pub(super) lead: Lead,
+    axes: AxisVector,
+    lead: Lead,
 }
 
 impl JointSpace {
@@ -62,16 +62,41 @@ impl JointSpace {
         self.axes = last.axes;
     }
 
+    /// What the drives are sent beyond the axes' coordinates, mm or rad per joint.
+    pub(super) fn offset(&self) -> &AxisVector {
+        &self.offset
+    }
+
+    /// The same, for homing to change.
+    pub(super) fn offset_mut(&mut self) -> &mut AxisVector {
+        &mut self.offset
+    }
+
+    /// Where the axes are by the feedback, as far as the kinematics last knew.
+    pub(super) fn last_axes(&self) -> &AxisVector {
+        &self.axes
+    }
+
+    /// The axes lead the joints again, after a fault.
+    pub(super) fn lead_again(&mut self) {
+        self.lead = Lead::Axes;
+    }
+
+    /// Whether the axes lead the joints; after a fault they may not.
+    pub(super) fn axes_lead(&self) -> bool {
+        self.lead == Lead::Axes
+    }
+
     /// Where the joints are to be in the sample `position`: where there are no kinematics, where the axes are.
     #[inline]
-    fn joints_of(&self, config: &FineConfig, position: &AxisVector) -> AxisVector {
+    pub(super) fn joints_of(&self, config: &FineConfig, position: &AxisVector) -> AxisVector {
         match &self.kinematics {
             None => *position + self.offset,
             Some(kinematics) => self.joints_by(kinematics.as_ref(), config, position),
         }
     }
 
-    /// Kinematics that are not linear have been asked by [`FineLoop::add_joints`], and the guard has seen what they
+    /// Kinematics that are not linear have been asked by [`Self::add_joints`], and the guard has seen what they
     /// answered: they are not asked again.
     #[inline(never)]
     fn joints_by(
@@ -95,9 +120,27 @@ impl JointSpace {
         (self.lead == Lead::Axes).then(|| kinematics.to_joints(position))
     }
 
-    /// Axis coordinates of `joints`, of `axes` axes, mm or rad; the first axis that the kinematics do not know, where that is one.
+    /// Axis coordinates of `joints`, mm or rad; the fault where the kinematics do not know them.
+    #[inline]
+    pub(super) fn axes_of(
+        &mut self,
+        config: &FineConfig,
+        joints: &AxisVector,
+    ) -> Result<AxisVector, FaultKind> {
+        if self.kinematics.is_none() {
+            return Ok(*joints - self.offset);
+        }
+        self.axes_by_kinematics(config.axis_count(), joints)
+            .map_err(|axis| FaultKind::WayBack { axis })
+    }
+
+    /// The same by the kinematics, of `axes` axes; the first axis that they do not know, where that is one.
     #[inline(never)]
-    fn axes_of(&mut self, axes: usize, joints: &AxisVector) -> Result<AxisVector, usize> {
+    fn axes_by_kinematics(
+        &mut self,
+        axes: usize,
+        joints: &AxisVector,
+    ) -> Result<AxisVector, usize> {
         let joints = *joints - self.offset;
         let Some(kinematics) = &self.kinematics else {
             return Ok(joints);
@@ -111,7 +154,11 @@ impl JointSpace {
     }
 
     /// The axes of `joints`, where kinematics that are asked for the joints there give the same ones.
-    fn found_from(&self, config: &FineConfig, joints: &AxisVector) -> Option<AxisVector> {
+    pub(super) fn found_from(
+        &self,
+        config: &FineConfig,
+        joints: &AxisVector,
+    ) -> Option<AxisVector> {
         let kinematics = self.kinematics.as_ref()?;
         let found = config.axes_alone(&kinematics.to_axes(joints));
         let again = kinematics.to_joints(&found);
@@ -121,138 +168,86 @@ impl JointSpace {
     }
 
     /// What the plugin says of itself.
-    fn error(&self) -> Option<PluginError> {
+    pub(super) fn error(&self) -> Option<PluginError> {
         self.kinematics.as_ref()?.health().err()
+    }
+
+    /// A sample on its way to the guard gets the joints behind its `axes` axes, which only the kinematics know. Where those do not
+    /// know either, that is the fault given, and each joint goes to rest by its own limit, as it does `after_fault` where a joint
+    /// cannot follow.
+    #[inline(never)]
+    pub(super) fn add_joints(
+        &mut self,
+        config: &FineConfig,
+        guard: &Guard,
+        after_fault: bool,
+        axes: usize,
+        position: &mut AxisVector,
+    ) -> Option<FaultKind> {
+        *position = config.axes_alone(position);
+        let lanes = axes..config.lane_count();
+        let mut fault = None;
+        let joints = self.ask(position).filter(|joints| {
+            fault = self.look_at_joints(config, guard, after_fault, position, joints);
+            self.lead == Lead::Axes
+        });
+        let joints = joints.unwrap_or_else(|| slower(config, guard, axes));
+        position.0[lanes.clone()].copy_from_slice(&joints.0[..lanes.len()]);
+        fault
+    }
+
+    /// Whether the joints go on where the kinematics want them. Before a fault the guard decides that; on the way to rest,
+    /// where every sample is sent, they do as long as each can follow.
+    fn look_at_joints(
+        &mut self,
+        config: &FineConfig,
+        guard: &Guard,
+        after_fault: bool,
+        position: &AxisVector,
+        joints: &AxisVector,
+    ) -> Option<FaultKind> {
+        let lanes = config.axis_count()..config.lane_count();
+        if position.0[..lanes.start]
+            .iter()
+            .any(|axis| !axis.is_finite())
+        {
+            // The plan is to blame, and the guard says so.
+            return None;
+        }
+        if let Some(joint) = (0..lanes.len()).find(|joint| !joints[*joint].is_finite()) {
+            self.lead = Lead::Nothing;
+            return Some(FaultKind::Kinematics { joint });
+        }
+        let follows = |entry: usize| can_follow(config, guard, entry, joints[entry - lanes.start]);
+        if after_fault && !lanes.clone().all(follows) {
+            self.lead = Lead::Nothing;
+        }
+        None
     }
 }
 
-impl FineLoop {
-    /// Where the joints are to be in the sample `position`.
-    #[inline]
-    pub(super) fn joints_of(&self, position: &AxisVector) -> AxisVector {
-        self.space.joints_of(&self.config, position)
-    }
+/// Whether the joint at `entry` reaches `next` within its limits of velocity and acceleration.
+fn can_follow(config: &FineConfig, guard: &Guard, entry: usize, next: f64) -> bool {
+    let (limits, period_s) = (&config.limits.axes[entry], config.period_s);
+    let before = guard.velocity()[entry];
+    let velocity = (next - guard.position()[entry]) / period_s;
+    let fastest = limits
+        .feed_mm_per_s
+        .max(limits.rapid_mm_per_s)
+        .max(before.abs());
+    let rounding = 4.0 * f64::EPSILON * next.abs().max(1.0) / period_s;
+    let within = |value: f64, most: f64| value.abs() <= most * (1.0 + ROUNDING) + rounding;
+    within(velocity, fastest) && within(velocity - before, limits.acceleration_mm_per_s2 * period_s)
+}
 
-    /// A sample on its way to the guard gets the joints behind the axes, where only the kinematics know them. Kinematics
-    /// that do not know either fault the machine, and each joint goes to rest by its own limit.
-    #[inline]
-    pub(super) fn add_joints(&mut self, position: &mut AxisVector) {
-        if let Joints::Curved { axes } = self.config.joints {
-            self.add_curved(axes, position);
-        }
+/// The joints behind `axes` axes a period later, each with less speed by its limit.
+fn slower(config: &FineConfig, guard: &Guard, axes: usize) -> AxisVector {
+    let (period_s, mut joints) = (config.period_s, AxisVector::ZERO);
+    for entry in axes..config.lane_count() {
+        let most = config.limits.axes[entry].acceleration_mm_per_s2;
+        let speed = guard.velocity()[entry];
+        let slower = speed.signum() * (speed.abs() - most * period_s).max(0.0);
+        joints[entry - axes] = guard.position()[entry] + slower * period_s;
     }
-
-    #[inline(never)]
-    fn add_curved(&mut self, axes: usize, position: &mut AxisVector) {
-        *position = self.config.axes_alone(position);
-        let joints = match self.space.ask(position) {
-            Some(joints) if self.accepts(axes, position, &joints) => joints,
-            _ => self.slower(axes),
-        };
-        position.0[axes..self.config.lane_count()].copy_from_slice(&joints.0[..self.drives.joints]);
-    }
-
-    /// Whether the joints go where the kinematics want them. Before a fault the guard decides that; on the way to rest,
-    /// where every sample is sent, they do as long as each can follow.
-    fn accepts(&mut self, axes: usize, position: &AxisVector, joints: &AxisVector) -> bool {
-        if position.0[..axes].iter().any(|axis| !axis.is_finite()) {
-            // The plan is to blame, and the guard says so.
-            return true;
-        }
-        if let Some(joint) = (0..self.drives.joints).find(|joint| !joints[*joint].is_finite()) {
-            self.space.lead = Lead::Nothing;
-            self.lose_way(FaultKind::Kinematics { joint });
-        } else if self.fault.is_some()
-            && !(0..self.drives.joints).all(|j| self.can_follow(axes + j, joints[j]))
-        {
-            self.space.lead = Lead::Nothing;
-        }
-        self.space.lead == Lead::Axes
-    }
-
-    /// Whether the joint at `entry` reaches `next` within its limits of velocity and acceleration.
-    fn can_follow(&self, entry: usize, next: f64) -> bool {
-        let (limits, period_s) = (&self.config.limits.axes[entry], self.config.period_s);
-        let before = self.guard.velocity()[entry];
-        let velocity = (next - self.guard.position()[entry]) / period_s;
-        let fastest = limits
-            .feed_mm_per_s
-            .max(limits.rapid_mm_per_s)
-            .max(before.abs());
-        let rounding = 4.0 * f64::EPSILON * next.abs().max(1.0) / period_s;
-        let within = |value: f64, most: f64| value.abs() <= most * (1.0 + ROUNDING) + rounding;
-        within(velocity, fastest)
-            && within(velocity - before, limits.acceleration_mm_per_s2 * period_s)
-    }
-
-    /// The joints a period later, each with less speed by its limit.
-    fn slower(&self, axes: usize) -> AxisVector {
-        let (period_s, mut joints) = (self.config.period_s, AxisVector::ZERO);
-        for joint in 0..self.drives.joints {
-            let (entry, most) = (
-                axes + joint,
-                self.config.limits.axes[axes + joint].acceleration_mm_per_s2,
-            );
-            let speed = self.guard.velocity()[entry];
-            let slower = speed.signum() * (speed.abs() - most * period_s).max(0.0);
-            joints[joint] = self.guard.position()[entry] + slower * period_s;
-        }
-        joints
-    }
-
-    /// Whether the joints rest when the axes do: they may have been slowing down on their own.
-    pub(super) fn joints_rest(&self) -> bool {
-        let first = self.config.axis_count();
-        self.space.lead == Lead::Axes
-            || self.guard.velocity().0[first..]
-                .iter()
-                .all(|speed| *speed == 0.0)
-    }
-
-    /// Whether the joints came to rest each on its own, away from where the axes were to be. Host.
-    pub fn joints_went_alone(&self) -> bool {
-        self.space.lead == Lead::Nothing
-    }
-
-    /// Axis coordinates of what the drives report, mm or rad. Where the kinematics do not know, the last ones, and a fault.
-    #[inline]
-    pub(super) fn axes_of(&mut self, joints: &AxisVector) -> AxisVector {
-        if self.space.kinematics.is_none() {
-            return *joints - self.space.offset;
-        }
-        match self.space.axes_of(self.config.axis_count(), joints) {
-            Ok(axes) => axes,
-            Err(axis) => {
-                self.lose_way(FaultKind::WayBack { axis });
-                self.space.axes
-            }
-        }
-    }
-
-    /// The position sent last, in the coordinates of the drives, which homing does not change, mm or rad. Where the joints
-    /// came to rest on their own, it is what the kinematics make of them, if that leads back. Host.
-    pub fn sent(&self) -> AxisVector {
-        let axes = self.config.axes_alone(self.guard.position());
-        if !self.joints_went_alone() {
-            return axes + self.space.offset;
-        }
-        let joints = self.joints_of(self.guard.position());
-        self.space.found_from(&self.config, &joints).unwrap_or(axes)
-    }
-
-    /// Where the joints were told to be last, mm or rad. Host.
-    pub fn told_to_joints(&self) -> AxisVector {
-        self.drives.setpoint.position
-    }
-
-    /// Faults the machine; the plugin's own words about it are kept for the host.
-    #[cold]
-    fn lose_way(&mut self, kind: FaultKind) {
-        if self.fault.is_none()
-            && let Some(error) = self.space.error()
-        {
-            self.plugin_error.get_or_insert(error);
-        }
-        self.fail(kind);
-    }
+    joints
 }

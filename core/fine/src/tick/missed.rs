@@ -1,7 +1,6 @@
 //! Fine periods that went by without a sample. At rest they cost nothing and are counted; in motion the drives had to
 //! bridge them, and can so only for a while.
 
-use super::FineLoop;
 use crate::config::FineConfig;
 use crate::fault::FaultKind;
 
@@ -43,8 +42,13 @@ impl Missed {
         }
     }
 
+    /// What is missed next begins a row.
+    pub(super) fn begin_row(&mut self) {
+        self.in_a_row = 0;
+    }
+
     /// The periods from `first` on were missed in motion, as part of a row. Bounded by the window.
-    fn count(&mut self, first: u64, periods: u64) -> Option<FaultKind> {
+    pub(super) fn count(&mut self, first: u64, periods: u64) -> Option<FaultKind> {
         self.in_a_row = self.in_a_row.saturating_add(periods);
         if self.in_a_row > self.max_in_a_row {
             let (missed, most) = (self.in_a_row, self.max_in_a_row);
@@ -76,29 +80,6 @@ impl Missed {
         period
             .checked_sub(self.last[self.next])
             .is_some_and(|passed| passed < self.window_periods)
-    }
-}
-
-impl FineLoop {
-    /// `periods` fine periods went by without a sample, `in_a_row` of them with those that were reported before them.
-    ///
-    /// In motion more in a row than [`crate::MissedLimits::in_a_row`], or more of a sliding second than
-    /// [`crate::MissedLimits::share`], are a fault. Fine thread; does not allocate; bounded work.
-    pub fn missed(&mut self, periods: u64, in_a_row: u64) {
-        let first = self.tick.saturating_add(self.counters.missed_periods);
-        self.counters.missed_periods += periods;
-        self.miss_beats(periods);
-        if in_a_row == periods {
-            self.missed.in_a_row = 0;
-        }
-        // What was sent last moves, or nothing does.
-        if self.guard.velocity().0.iter().all(|speed| *speed == 0.0) {
-            return;
-        }
-        self.counters.missed_in_motion += periods;
-        if let Some(kind) = self.missed.count(first, periods) {
-            self.fail(kind);
-        }
     }
 }
 

@@ -7,10 +7,9 @@
 //! the plan itself takes a quarter of the acceleration and an eighth of the jerk at most, so that what is left brings σ up in
 //! four times that, and by then far more than one period of program time has passed.
 
-use super::FineLoop;
 use super::govern::Ask;
 use crate::config::FineConfig;
-use crate::cursor::Reached;
+use crate::cursor::{Cursor, Reached};
 use crate::fault::FaultKind;
 
 /// How many times the longest way of an axis from rest to its highest speed a window lasts.
@@ -18,7 +17,7 @@ const WINDOW: f64 = 4.0;
 /// Periods beside that: in the first 16 a jerk limit lets σ change by hundredths only, whatever the axes could.
 const FIRST_PERIODS: f64 = 32.0;
 
-/// A rate of program time that is none: a period of it is the rounding of a day of program time.
+/// An override or a ratio below it is as good as 0, and a rate of program time that is none: a period of it is the rounding of a day of program time.
 const NO_RATE: f64 = 1e-8;
 
 /// What has passed since progress was last made.
@@ -69,43 +68,38 @@ impl Progress {
     fn begin(&mut self, now_s: f64) {
         (self.periods, self.from_s, self.asked) = (0, now_s, 1.0);
     }
-}
 
-impl FineLoop {
-    /// Whether an override or a ratio is as good as 0: what passes then is in the rounding of a day.
-    fn stands_by_ratio(&self) -> bool {
-        let ratios = self.ratios_in_force();
-        ratios.feed.min(ratios.rapid) < NO_RATE
-    }
-
-    fn has_nothing_to_do(&self, reached: Reached) -> bool {
-        reached == Reached::Rest && self.plan.cursor.is_last()
-    }
-
-    /// After a move: program time has got on, or nothing asks for it, or that is a fault.
-    pub(super) fn watch_progress(&mut self, ask: Ask, reached: Reached) {
-        let now_s = self.plan.cursor.program_time_s();
-        let grown_s = now_s - self.progress.from_s;
-        let min_s = self.progress.asked * self.config.period_s;
-        let is_at_next_rest = reached == Reached::Rest && now_s > self.progress.last_s;
-        self.progress.last_s = now_s;
+    /// After a move that `reached` something: program time has got on, or nothing asks for it, or that is the fault given. It is
+    /// to get on at a rate of `least_ratio`, the lower one of those for feeds and rapids.
+    #[inline]
+    pub(super) fn watch(
+        &mut self,
+        cursor: &Cursor,
+        ask: Ask,
+        reached: Reached,
+        period_s: f64,
+        least_ratio: impl FnOnce() -> f64,
+    ) -> Option<FaultKind> {
+        let now_s = cursor.program_time_s();
+        let grown_s = now_s - self.from_s;
+        let min_s = self.asked * period_s;
+        let is_at_next_rest = reached == Reached::Rest && now_s > self.last_s;
+        self.last_s = now_s;
         // What is true nearly always is looked at first.
         if grown_s > min_s
             || is_at_next_rest
             || ask != Ask::Run
-            || self.stands_by_ratio()
-            || self.has_nothing_to_do(reached)
+            || least_ratio() < NO_RATE
+            || (reached == Reached::Rest && cursor.is_last())
         {
-            self.progress.begin(now_s);
-            return;
+            self.begin(now_s);
+            return None;
         }
-        self.progress.periods += 1;
-        if self.progress.periods > self.progress.max_periods {
-            self.fail(FaultKind::NoProgress {
-                periods: self.progress.periods,
-                grown_s,
-                asked: self.progress.asked,
-            });
-        }
+        self.periods += 1;
+        (self.periods > self.max_periods).then_some(FaultKind::NoProgress {
+            periods: self.periods,
+            grown_s,
+            asked: self.asked,
+        })
     }
 }

@@ -5,7 +5,11 @@
 //! equal steps is a ramp of the feed. The price is that a ratio acts on average half a rough period later.
 
 use rtrb::Consumer;
-use tandem_rings::Ratio;
+use tandem_rings::{OperatorInputs, Ratio};
+
+use super::govern::Ratios;
+use crate::config::FineConfig;
+use crate::outputs::Outputs;
 
 /// A ratio on its way.
 #[derive(Clone, Copy, Debug)]
@@ -92,13 +96,45 @@ impl StrategyRatio {
     }
 
     /// The ratio at the end of the present period.
-    pub(super) fn now(&self) -> f64 {
+    fn now(&self) -> f64 {
         self.led.now()
     }
 
     /// Its mean over the present period.
-    pub(super) fn mean(&self) -> f64 {
+    fn mean(&self) -> f64 {
         self.led.mean()
+    }
+
+    /// The ratios that count now: this one and the operator's, each where the program permits it.
+    #[inline]
+    pub(super) fn in_force(
+        &self,
+        config: &FineConfig,
+        outputs: &Outputs,
+        inputs: &OperatorInputs,
+    ) -> Ratios {
+        let operator = outputs.permitted_override(inputs);
+        let [feed, mean_feed] = if outputs.adaptive_permitted {
+            // What is above 1 is in the ratio already, within the strategy's own bounds.
+            let operator = if config.strategy_takes_override {
+                operator.min(1.0)
+            } else {
+                operator
+            };
+            [self.now(), self.mean()].map(|ratio| operator * ratio)
+        } else {
+            [operator; 2]
+        };
+        let rapid = if outputs.override_permitted {
+            inputs.rapid_override.min(1.0)
+        } else {
+            1.0
+        };
+        Ratios {
+            feed,
+            mean_feed,
+            rapid,
+        }
     }
 }
 

@@ -1,8 +1,5 @@
 //! Single-block operation: a hold at the end of every line of the program.
 
-use std::sync::atomic::Ordering::Relaxed;
-
-use super::FineLoop;
 use super::govern::PlanFollower;
 use crate::governor::RestAt;
 use crate::governor::tuning::LINE_END_JERK_SHARES;
@@ -76,29 +73,6 @@ impl PlanFollower {
         if self.governor.sigma() == 0.0 && end_mm - self.cursor.path_mm() < LINE_END_MM {
             self.chosen.holds = true;
             self.line_end.forget();
-        }
-    }
-}
-
-impl FineLoop {
-    /// At a rest of the plan between two lines: a feed hold stands until the operator resumes.
-    pub(super) fn stop_between_lines(&mut self) {
-        if !self.given.single_block || !self.plan.cursor.is_resting() {
-            self.line_moves |= !self.plan.cursor.is_resting();
-            return;
-        }
-        let line = self.plan.cursor.segment().line;
-        if self.line_moves
-            && self
-                .plan
-                .cursor
-                .next_line()
-                .is_some_and(|next| next != line)
-        {
-            self.controls.hold.store(true, Relaxed);
-            // It acts in this period already.
-            self.given.hold = true;
-            self.line_moves = false;
         }
     }
 }

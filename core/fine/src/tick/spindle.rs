@@ -1,6 +1,7 @@
 //! A spindle on its way to its speed: what is in progress goes on, and no cut begins before it is there.
 
-use super::FineLoop;
+use super::drives::Drives;
+use crate::config::FineConfig;
 use crate::fault::FaultKind;
 
 /// Exchanges behind which a driver without delay has answered to a speed: the one that tells it, and one.
@@ -12,7 +13,7 @@ pub(super) struct SpinUp {
     /// Exchanges since it was told; none where it was reached.
     exchanges: Option<u64>,
     /// The motion of this period waits for it.
-    pub(super) waits: bool,
+    waits: bool,
 }
 
 impl SpinUp {
@@ -28,56 +29,66 @@ impl SpinUp {
     pub(super) fn is_awaited(self) -> bool {
         self.exchanges.is_some()
     }
-}
 
-impl FineLoop {
-    /// Behind an exchange: the spindle may have come to its speed, or is told to stand, which nothing waits for.
-    pub(super) fn hear_spindle(&mut self) {
-        let Some(exchanges) = self.spin_up.exchanges else {
+    /// Whether the motion of this period waits for it.
+    pub(super) fn waits(self) -> bool {
+        self.waits
+    }
+
+    /// Before a period: nothing waits for it yet.
+    pub(super) fn begin_period(&mut self) {
+        self.waits = false;
+    }
+
+    /// After an exchange: the spindle may have come to its speed, or is told to stand, which nothing waits for.
+    #[inline]
+    pub(super) fn hear(&mut self, drives: &Drives, config: &FineConfig) {
+        let Some(exchanges) = self.exchanges else {
             return;
         };
-        self.spin_up.exchanges = Some(exchanges + 1);
-        let is_there = self.has_answered() && self.drives.feedback.spindle_at_speed != 0;
-        if is_there || self.drives.setpoint.spindle_rad_per_s == 0.0 {
-            self.spin_up = SpinUp::default();
+        self.exchanges = Some(exchanges + 1);
+        let is_there = self.has_answer(drives, config) && drives.feedback().spindle_at_speed != 0;
+        if is_there || drives.setpoint().spindle_rad_per_s == 0.0 {
+            *self = Self::default();
         }
     }
 
     /// Whether what the driver says of the spindle is of the speed that it was told last. A spindle has no delay of its own: that
     /// of the slowest joint is its.
-    fn has_answered(&self) -> bool {
-        let delay = self.config.attached.delay_periods[..self.drives.joints]
+    fn has_answer(self, drives: &Drives, config: &FineConfig) -> bool {
+        let delay = config.attached.delay_periods[..drives.joints()]
             .iter()
             .max()
             .map_or(0, |most| u64::from(*most));
-        self.spin_up
-            .exchanges
+        self.exchanges
             .is_none_or(|exchanges| exchanges >= ANSWERED + delay)
     }
 
-    /// Whether the motion of this period waits for the spindle: a cut does, from its start or in its midst. As long as the driver
-    /// has not answered, what moves goes on, and what stands stays ([`crate::cursor::Cursor::advance`] at a rest).
-    pub(super) fn waits_for_spindle(&mut self) -> bool {
-        if !self.spin_up.is_awaited() {
+    /// Whether the motion of this period waits for the spindle: a cut does, from its start or in its midst, where the machine
+    /// `stands_inside` it. As long as the driver has not answered, what moves goes on, and what stands stays
+    /// ([`crate::cursor::Cursor::advance`] at a rest).
+    pub(super) fn look(
+        &mut self,
+        drives: &Drives,
+        config: &FineConfig,
+        stands_inside: bool,
+        is_cutting: impl FnOnce() -> bool,
+    ) -> bool {
+        if !self.is_awaited() {
             return false;
         }
-        let stands_inside = !self.plan.cursor.is_resting() && self.plan.governor.sigma() == 0.0;
-        self.spin_up.waits =
-            (self.has_answered() || stands_inside) && self.plan.cursor.is_cutting();
-        self.spin_up.waits
+        self.waits = (self.has_answer(drives, config) || stands_inside) && is_cutting();
+        self.waits
     }
 
-    /// Whether a cut waits for longer than the spindle may take: then that is the fault.
-    pub(super) fn is_spindle_slow(&mut self) -> bool {
-        let waited_s = self.spin_up.exchanges.unwrap_or_default() as f64 * self.config.period_s;
-        let is_slow = self.spin_up.waits && waited_s > self.config.at_speed_within_s;
-        if is_slow {
-            self.fail(FaultKind::SpindleSlow {
-                within_s: self.config.at_speed_within_s,
-                told_rad_per_s: self.drives.setpoint.spindle_rad_per_s,
-                turns_rad_per_s: self.drives.feedback.spindle_rad_per_s,
-            });
-        }
-        is_slow
+    /// The fault that it is where a cut waits for longer than the spindle may take.
+    pub(super) fn fault(self, drives: &Drives, config: &FineConfig) -> Option<FaultKind> {
+        let waited_s = self.exchanges.unwrap_or_default() as f64 * config.period_s;
+        let is_slow = self.waits && waited_s > config.at_speed_within_s;
+        is_slow.then(|| FaultKind::SpindleSlow {
+            within_s: config.at_speed_within_s,
+            told_rad_per_s: drives.setpoint().spindle_rad_per_s,
+            turns_rad_per_s: drives.feedback().spindle_rad_per_s,
+        })
     }
 }

@@ -5,7 +5,7 @@
 //!
 //! `tandem jog` is a run whose source is a `tandem_session::jog::JogSession`. Keys, clients and lines ask its
 //! `JogController`; the source turns what waits into one line block at rest, towards the travel limit or by a distance.
-//! The dead man's switch lies in the fine loop (`core/fine/src/tick/keep_alive.rs`): it counts periods since the last
+//! The dead man's switch lies in the fine loop (`core/fine/src/tick/operator.rs`): it counts periods since the last
 //! beat, an atomic, and lets go by the same mechanism as an abort, an epoch that ends at a rest on the path. A hold
 //! stays in force, for the next jog too.
 

@@ -1,0 +1,219 @@
+//! How fast program time passes: the plan that is followed, and all that says at which rate.
+
+use std::sync::Arc;
+
+use rtrb::Consumer;
+use tandem_rings::{Depth, OperatorInputs, Queued, Ratio};
+use tandem_sdk::{AxisVector, StopOn};
+
+use super::govern::{Ask, Governed, PlanFollower, Ratios, Request};
+use super::progress::Progress;
+use super::queue::QueueWatch;
+use super::ratio::StrategyRatio;
+use crate::config::FineConfig;
+use crate::cursor::{Cursor, Reached};
+use crate::fault::FaultKind;
+use crate::outputs::Outputs;
+
+/// The plan as it is followed, and what its rate depends on.
+pub(super) struct Rate {
+    plan: PlanFollower,
+    strategy: StrategyRatio,
+    depth: Arc<Depth>,
+    queue: QueueWatch,
+    progress: Progress,
+    /// Something has moved since the last hold between two lines.
+    line_moves: bool,
+}
+
+impl Rate {
+    /// At rest in front of an empty queue. Host; allocates.
+    pub(super) fn new(
+        config: &FineConfig,
+        segments: Consumer<Queued>,
+        ratios: Consumer<Ratio>,
+        depth: Arc<Depth>,
+    ) -> Self {
+        Self {
+            plan: PlanFollower::new(config, Cursor::new(segments, &config.position)),
+            strategy: StrategyRatio::new(ratios, config.ratio_periods),
+            depth,
+            queue: QueueWatch::default(),
+            progress: Progress::new(config),
+            line_moves: false,
+        }
+    }
+
+    /// Where the machine is in the plan.
+    #[inline]
+    pub(super) fn cursor(&self) -> &Cursor {
+        &self.plan.cursor
+    }
+
+    /// The rate at the end of the last period.
+    #[inline]
+    pub(super) fn sigma(&self) -> f64 {
+        self.plan.governor.sigma()
+    }
+
+    /// The feed at the end of the last period, mm/s.
+    #[inline]
+    pub(super) fn end_feed_mm_per_s(&self) -> f64 {
+        self.sigma() * self.plan.cursor.path_speed_mm_per_s()
+    }
+
+    /// Whether nothing moves along the plan.
+    pub(super) fn stands(&self) -> bool {
+        self.sigma() == 0.0 || self.plan.cursor.is_resting()
+    }
+
+    /// Whether the machine stands where the plan does not.
+    pub(super) fn stands_inside(&self) -> bool {
+        !self.plan.cursor.is_resting() && self.sigma() == 0.0
+    }
+
+    /// Whether what comes next, or is in progress, is a cut.
+    pub(super) fn is_cutting(&mut self) -> bool {
+        self.plan.cursor.is_cutting()
+    }
+
+    /// What the motion that begins next at a rest waits for; `None` elsewhere.
+    pub(super) fn next_stop_on(&mut self) -> Option<StopOn> {
+        let cursor = &mut self.plan.cursor;
+        cursor.is_resting().then(|| cursor.next_stop_on())
+    }
+
+    /// Takes the strategy's ratios that are due in the fine period `tick`; gives how many came too late.
+    #[inline]
+    pub(super) fn take_ratios(&mut self, tick: u64) -> u64 {
+        self.strategy.take(tick)
+    }
+
+    /// The ratios that count now, where the program permits them.
+    #[inline]
+    pub(super) fn ratios_in_force(
+        &self,
+        config: &FineConfig,
+        outputs: &Outputs,
+        inputs: &OperatorInputs,
+    ) -> Ratios {
+        self.strategy.in_force(config, outputs, inputs)
+    }
+
+    /// In single-block operation: whether the machine rests between two lines, and has moved since it last did.
+    pub(super) fn is_between_lines(&mut self, single_block: bool) -> bool {
+        if !single_block || !self.plan.cursor.is_resting() {
+            self.line_moves |= !self.plan.cursor.is_resting();
+            return false;
+        }
+        let line = self.plan.cursor.segment().line;
+        let ends = self.line_moves
+            && self
+                .plan
+                .cursor
+                .next_line()
+                .is_some_and(|next| next != line);
+        self.line_moves &= !ends;
+        ends
+    }
+
+    /// Looks at the queue; gives whether it has begun to starve.
+    #[inline]
+    pub(super) fn look_at_queue(&mut self, period_s: f64) -> bool {
+        self.queue.look(
+            &self.depth,
+            self.plan.cursor.program_time_s(),
+            self.plan.governor.sigma(),
+            self.plan.cursor.path_speed_mm_per_s(),
+            period_s,
+        )
+    }
+
+    /// Whether the queue is too short to go on at full speed and still be able to stop.
+    pub(super) fn is_starved(&self) -> bool {
+        self.queue.is_starved()
+    }
+
+    /// At a rest any rate is as good: where the plan is to run, the highest that the queue allows, else none.
+    #[inline]
+    pub(super) fn begin_at_rest(&mut self, ask: Ask) {
+        if self.plan.cursor.is_resting() {
+            self.plan.governor.jump(if ask == Ask::Run {
+                self.depth.max_rate.load()
+            } else {
+                0.0
+            });
+        }
+    }
+
+    /// Chooses the rate for this period.
+    #[inline]
+    pub(super) fn govern(&mut self, ask: Ask, ratios: Ratios, single_block: bool) -> &Governed {
+        let governed = self.plan.govern(Request {
+            ask,
+            ratios,
+            single_block,
+            max_rate: self.depth.max_rate.load(),
+            stop_deceleration_mm_per_s2: self.depth.stop_deceleration_mm_per_s2.load(),
+        });
+        self.progress.ask(governed.least_asked);
+        governed
+    }
+
+    /// Moves on by `delta_s` of program time; `meet` says whether the machine is to stay at a rest ([`Cursor::advance`]).
+    #[inline]
+    pub(super) fn advance(&mut self, delta_s: f64, meet: impl FnMut(&Queued) -> bool) -> Reached {
+        self.plan.cursor.advance(delta_s, meet)
+    }
+
+    /// After a move that `reached` something: the fault where program time should have got on and has not.
+    #[inline]
+    pub(super) fn watch_progress(
+        &mut self,
+        ask: Ask,
+        reached: Reached,
+        config: &FineConfig,
+        outputs: &Outputs,
+        inputs: &OperatorInputs,
+    ) -> Option<FaultKind> {
+        // What was met on the way may have changed which ratios count.
+        let least_ratio = || {
+            let ratios = self.strategy.in_force(config, outputs, inputs);
+            ratios.feed.min(ratios.rapid)
+        };
+        self.progress.watch(
+            &self.plan.cursor,
+            ask,
+            reached,
+            config.period_s,
+            least_ratio,
+        )
+    }
+
+    /// Whether motion of the first epoch, or of one that has been planned anew, may start.
+    pub(super) fn may_start(&mut self) -> bool {
+        let is_planned = self.plan.cursor.epoch() == 0
+            || (self.depth.is_of(self.plan.cursor.epoch()) && self.plan.cursor.drop_older());
+        is_planned && self.depth.may_start(self.plan.cursor.program_time_s())
+    }
+
+    /// Whether motion of an epoch after the first may go on.
+    pub(super) fn may_go_on(&mut self) -> bool {
+        let enough = self.depth.is_of(self.plan.cursor.epoch())
+            && self.depth.may_start(self.plan.cursor.program_time_s());
+        self.plan.cursor.drop_older() && enough
+    }
+
+    /// Rests at `position`; what is queued counts no more.
+    pub(super) fn end_epoch(&mut self, position: &AxisVector) {
+        self.plan.cursor.end_epoch(position);
+        self.plan.forget_ahead();
+        self.queue.forget();
+    }
+
+    /// Once more after a fault: program time passes at its own rate. Host; allocates.
+    pub(super) fn forget(&mut self, config: &FineConfig) {
+        self.plan.forget_rate(config);
+        self.progress = Progress::new(config);
+    }
+}
