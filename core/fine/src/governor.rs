@@ -113,21 +113,80 @@ use crate::period_points::PeriodPoints;
 /// Relative tolerance within which a plan is at its limit, not beyond it.
 const TOLERANCE: f64 = 1e-6;
 
+/// Where the rate is to go in the coming period.
+#[derive(Clone, Copy, Debug)]
+pub enum Goal {
+    /// Rest along the path: a hold, a stop, or a feed of nothing.
+    Rest {
+        /// Rate to reach as far as the path's speed does not say how to stop: where the plan stands still it says nothing.
+        sigma: f64,
+    },
+    /// A rate at which the plan is followed.
+    Run {
+        /// Rate of program time to reach.
+        sigma: f64,
+        /// Path speed not to exceed, mm/s; infinite where none is asked for.
+        speed_mm_per_s: f64,
+        /// Where to rest all the same.
+        rest_at: Option<RestAt>,
+    },
+}
+
+impl Goal {
+    /// To run at `sigma` with no more than `speed_mm_per_s` along the path; at a speed of nothing that is rest.
+    pub fn run(sigma: f64, speed_mm_per_s: f64, rest_at: Option<RestAt>) -> Self {
+        if speed_mm_per_s == 0.0 {
+            Self::Rest { sigma }
+        } else {
+            Self::Run {
+                sigma,
+                speed_mm_per_s,
+                rest_at,
+            }
+        }
+    }
+
+    /// Whether it is rest.
+    pub fn is_rest(&self) -> bool {
+        matches!(self, Self::Rest { .. })
+    }
+
+    /// Rate of program time to reach.
+    fn sigma(&self) -> f64 {
+        let (Self::Rest { sigma } | Self::Run { sigma, .. }) = self;
+        *sigma
+    }
+
+    /// Path speed not to exceed, mm/s.
+    fn speed_mm_per_s(&self) -> f64 {
+        match self {
+            Self::Rest { .. } => 0.0,
+            Self::Run { speed_mm_per_s, .. } => *speed_mm_per_s,
+        }
+    }
+}
+
 /// What is asked of the coming period.
 #[derive(Clone, Copy, Debug)]
 pub struct Aim {
-    /// Rate of program time to reach.
-    pub sigma: f64,
-    /// Path speed not to exceed, mm/s.
-    pub speed_mm_per_s: f64,
+    /// Where the rate is to go.
+    pub goal: Goal,
     /// Share of the programmed feeds ahead that is not to be exceeded there; infinite where the plan keeps what is asked.
     pub ratio: f64,
     /// Rate at which the plan keeps that share wherever it is.
     pub kept_rate: f64,
     /// Derivatives of the plan's path coordinate here by program time.
     pub path: [f64; 3],
-    /// Where to rest.
-    pub rest_at: Option<RestAt>,
+}
+
+impl Aim {
+    /// Whether a feed is to be kept that the plan may go beyond: on the way to rest those ahead, else the speed asked for too.
+    fn keeps_feed(&self) -> bool {
+        match self.goal {
+            Goal::Rest { .. } => self.ratio.is_finite(),
+            Goal::Run { speed_mm_per_s, .. } => speed_mm_per_s.min(self.ratio).is_finite(),
+        }
+    }
 }
 
 /// The rate of program time.

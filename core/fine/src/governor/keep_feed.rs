@@ -63,9 +63,9 @@ impl Governor {
         horizon: &Horizon,
         here: &RateState<'_>,
     ) -> f64 {
-        let h = self.period_s;
+        let (h, sigma) = (self.period_s, aim.goal.sigma());
         if aim.path[0] <= 0.0 {
-            let goal = aim.sigma.min(aim.ratio);
+            let goal = sigma.min(aim.ratio);
             if self.sigma < goal && (self.sigma == 0.0 || is_in_dwell(&here.place, h)) {
                 // A hold in a dwell, or the end of what was queued, has taken the rate to nothing, and a dwell has no speed that
                 // says how fast it is to pass.
@@ -74,19 +74,26 @@ impl Governor {
             // From rest the rate was chosen for what follows.
             return -self.rate_per_s / h;
         }
-        let free = self.small(self.freely(aim.sigma, horizon), horizon);
-        let below = if aim.speed_mm_per_s.is_finite() {
-            self.below(aim, free, here, horizon)
+        let free = self.small(self.freely(sigma, horizon), horizon);
+        let speed_mm_per_s = aim.goal.speed_mm_per_s();
+        let below = if speed_mm_per_s.is_finite() {
+            self.below(speed_mm_per_s, free, here, horizon)
         } else {
             free
         };
         below.max(-MAX_LOWERING / (h * h))
     }
 
-    /// The greatest σ̈ up to `most` with which the speed at the end of the period is on the curve or below it, and its mean
-    /// below the limit.
-    fn below(&self, aim: &Aim, most: f64, here: &RateState<'_>, horizon: &Horizon) -> f64 {
-        let (h, limit) = (self.period_s, FEED_SHARE * aim.speed_mm_per_s);
+    /// The greatest σ̈ up to `most` with which the speed at the end of the period is on the curve to `speed_mm_per_s` or below it,
+    /// and its mean below that.
+    fn below(
+        &self,
+        speed_mm_per_s: f64,
+        most: f64,
+        here: &RateState<'_>,
+        horizon: &Horizon,
+    ) -> f64 {
+        let (h, limit) = (self.period_s, FEED_SHARE * speed_mm_per_s);
         let Some(from) = here.place.pace() else {
             return most;
         };
@@ -97,7 +104,7 @@ impl Governor {
             jerk_mm_per_s3: RISE_JERK_SHARE * horizon.approach_jerk_share * jerk,
             reserve_s: RISE_PERIODS * h,
         };
-        let is_below = here.sigma * from.speed <= aim.speed_mm_per_s / FEED_SHARE;
+        let is_below = here.sigma * from.speed <= speed_mm_per_s / FEED_SHARE;
         let mut change = most;
         for _ in 0..ROUNDS {
             let mut way = *here;
@@ -111,7 +118,7 @@ impl Governor {
             let mut over = (rise - allowed) / (to.speed * h * (1.0 + per_s * h / 2.0));
             if is_below {
                 let mean_over =
-                    (from.way_to_mm(&to) / h - aim.speed_mm_per_s) * 6.0 / (to.speed * h * h);
+                    (from.way_to_mm(&to) / h - speed_mm_per_s) * 6.0 / (to.speed * h * h);
                 let end_over = (speed - limit) * 2.0 / (to.speed * h * h);
                 over = over.max(mean_over).max(end_over);
             }

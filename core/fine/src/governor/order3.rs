@@ -9,7 +9,7 @@ use super::tuning::{
     APPROACH_END_FACTOR, CLEARLY_LONGER, EXCESSES, ORDER3_LIMIT_SHARE, SNAP_SHARE,
 };
 use super::way_below::Below;
-use super::{Aim, Governor};
+use super::{Aim, Goal, Governor};
 use crate::horizon::Horizon;
 use crate::law::{stop_s, to_rest};
 use crate::plan_ahead::PlanCursor;
@@ -40,43 +40,37 @@ impl Governor {
             place,
             recent,
         };
-        let stops = aim.speed_mm_per_s == 0.0;
-        let keeps = if stops {
-            aim.ratio
-        } else {
-            aim.speed_mm_per_s.min(aim.ratio)
-        };
-        let mut below = keeps
-            .is_finite()
+        let mut below = aim
+            .keeps_feed()
             .then(|| Below::new(aim, &here, self.period_s));
-        let wanted = if below.is_some() && !stops {
-            self.wanted_below(aim, horizon, &here)
-        } else {
-            self.wanted_freely(aim, horizon, &place)
-        };
-        let wanted = match &aim.rest_at {
-            Some(rest) => {
-                let stop = Aim {
-                    speed_mm_per_s: 0.0,
-                    ..*aim
+        let wanted = match &aim.goal {
+            Goal::Rest { .. } => self.wanted_freely(aim, horizon, &place),
+            Goal::Run { sigma, rest_at, .. } => {
+                let wanted = if below.is_some() {
+                    self.wanted_below(aim, horizon, &here)
+                } else {
+                    self.wanted_freely(aim, horizon, &place)
                 };
-                let slowest = self.wanted_freely(&stop, horizon, &place);
-                self.wanted_to_rest_at(rest, (slowest, wanted), &here)
+                rest_at.map_or(wanted, |rest| {
+                    let goal = Goal::Rest { sigma: *sigma };
+                    let slowest = self.wanted_freely(&Aim { goal, ..*aim }, horizon, &place);
+                    self.wanted_to_rest_at(&rest, (slowest, wanted), &here)
+                })
             }
-            None => wanted,
         };
-        let chosen = self.choose_change(wanted, here, (below.as_mut(), stops), horizon);
+        let chosen = self.choose_change(wanted, here, below.as_mut(), &aim.goal, horizon);
         self.end_approach(aim, horizon);
         chosen
     }
 
-    /// The σ̈ nearest to `wanted` that leaves a way on, taken. Where the rate is to come to nothing, `stops`, that comes before the feed:
-    /// it is not put off for a way on which the feed is kept.
+    /// The σ̈ nearest to `wanted` that leaves a way on, taken. Where the goal is rest, that comes before the feed: it is not put off for
+    /// a way on which the feed is kept.
     fn choose_change(
         &mut self,
         mut wanted: f64,
         mut here: RateState<'_>,
-        (below, stops): (Option<&mut Below<'_>>, bool),
+        below: Option<&mut Below<'_>>,
+        goal: &Goal,
         horizon: &Horizon,
     ) -> Chosen {
         let is_constant = wanted == 0.0 && self.rate_per_s == 0.0;
@@ -98,7 +92,7 @@ impl Governor {
                 };
             }
             change = self.recoverable_below(wanted, here, below, horizon);
-            if change.is_none() && stops && self.recovery.keeps_feed {
+            if change.is_none() && goal.is_rest() && self.recovery.keeps_feed {
                 self.recovery.keeps_feed = false;
                 wanted = wanted.min(self.recovery.peek().unwrap_or(wanted));
             }
@@ -203,10 +197,9 @@ impl Governor {
     fn end_approach(&mut self, aim: &Aim, horizon: &Horizon) {
         let h = self.period_s;
         let most = SNAP_SHARE * horizon.rate_change_per_s2.min(1.0 / (h * h)) * h;
-        let target = if aim.speed_mm_per_s == 0.0 {
-            0.0
-        } else {
-            aim.sigma
+        let target = match aim.goal {
+            Goal::Rest { .. } => 0.0,
+            Goal::Run { sigma, .. } => sigma,
         };
         if (self.sigma - target).abs() < most * h && self.rate_per_s.abs() < most {
             (self.sigma, self.rate_per_s) = (target, 0.0);
@@ -228,7 +221,7 @@ impl Governor {
         let most = ORDER3_LIMIT_SHARE * horizon.rate_change_per_s2;
         let free = if most.is_finite() {
             self.approach(
-                self.sigma - aim.sigma,
+                self.sigma - aim.goal.sigma(),
                 horizon.approach_jerk_share * most,
                 most,
             )
@@ -239,10 +232,11 @@ impl Governor {
         let along = sigma * sigma * acceleration + speed * rate;
         let path_jerk = horizon.path_jerk_to_rest(sigma, sigma * speed, along);
         let path_jerk = ORDER3_LIMIT_SHARE * path_jerk.min(speed * horizon.small_change_per_s2());
-        if aim.speed_mm_per_s.is_infinite() || speed <= 0.0 || !path_jerk.is_finite() {
+        let most_mm_per_s = aim.goal.speed_mm_per_s();
+        if most_mm_per_s.is_infinite() || speed <= 0.0 || !path_jerk.is_finite() {
             return free;
         }
-        let over = sigma * speed - aim.speed_mm_per_s;
+        let over = sigma * speed - most_mm_per_s;
         if over == 0.0 && along == 0.0 {
             return free.min(0.0);
         }
@@ -268,7 +262,7 @@ impl Governor {
     fn wanted_by_slowest(&self, aim: &Aim, horizon: &Horizon, place: &PlanCursor<'_>) -> f64 {
         let (h, sigma, rate) = (self.period_s, self.sigma, self.rate_per_s);
         let [speed, acceleration, _] = aim.path;
-        if aim.speed_mm_per_s > 0.0 || sigma == 0.0 || speed <= 0.0 {
+        if !aim.goal.is_rest() || sigma == 0.0 || speed <= 0.0 {
             return f64::INFINITY;
         }
         let along = sigma * sigma * acceleration + speed * rate;

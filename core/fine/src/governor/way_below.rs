@@ -365,6 +365,7 @@ fn periods_of_step(passed: u32) -> u32 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Goal;
     use super::*;
     use crate::plan_ahead::{Ahead, TWO_LINEAR, derivatives};
     use crate::steps::Recent;
@@ -426,7 +427,7 @@ mod tests {
                 horizon.fill(&ahead, period_s);
                 let rise = (speed_at(at_s + 1e-6) - speed_at(at_s - 1e-6)) / 2e-6;
                 let aim = Aim {
-                    sigma: 1.0, speed_mm_per_s: ratio * from, ratio, kept_rate, path: [speed_at(at_s), rise, 0.0], rest_at: None,
+                    goal: Goal::run(1.0, ratio * from, None), ratio, kept_rate, path: [speed_at(at_s), rise, 0.0],
                 };
                 let chosen = governor.smooth(&aim, &horizon, ahead.place(TWO_LINEAR), Recent::default());
                 prop_assert!(!chosen.relaxed && chosen.delta_s > 0.0, "{chosen:?} at {at_s} of {time_s} s");

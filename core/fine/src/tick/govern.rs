@@ -8,7 +8,7 @@ use tandem_rings::STOP_SHARE;
 
 use crate::config::{FineConfig, GuardMode};
 use crate::cursor::Cursor;
-use crate::governor::{Aim, Governor};
+use crate::governor::{Aim, Goal, Governor};
 use crate::horizon::Horizon;
 use crate::law::Along;
 use crate::period_points::PeriodPoints;
@@ -397,24 +397,21 @@ impl PlanFollower {
             };
             ratio * ahead.feed_mm_per_s.min(here)
         };
-        let aim = match ask {
-            Ask::Run => Aim {
-                sigma: run,
-                speed_mm_per_s: feed.min(way_speed_mm_per_s),
-                ratio,
-                kept_rate: ratio / self.max_feed_ratio,
-                path,
-                rest_at: end_mm.map(|end_mm| self.rest_at(end_mm)),
-            },
+        let goal = match ask {
+            Ask::Run => {
+                let rest_at = end_mm.map(|end_mm| self.rest_at(end_mm));
+                Goal::run(run, feed.min(way_speed_mm_per_s), rest_at)
+            }
             // Where the plan stands still, its path says nothing.
-            _ => Aim {
+            _ => Goal::Rest {
                 sigma: if path[0] > 0.0 { run } else { 0.0 },
-                speed_mm_per_s: 0.0,
-                ratio,
-                kept_rate: ratio / self.max_feed_ratio,
-                path,
-                rest_at: None,
             },
+        };
+        let aim = Aim {
+            goal,
+            ratio,
+            kept_rate: ratio / self.max_feed_ratio,
+            path,
         };
         let recent = self.cursor.recent_steps();
         let ahead = self.cursor.ahead();
