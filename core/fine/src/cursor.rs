@@ -2,9 +2,9 @@
 
 use rtrb::Consumer;
 use tandem_rings::Queued;
-use tandem_sdk::{AxisVector, Edge, Segment, SegmentFlags, StopOn};
+use tandem_sdk::{AxisVector, Edge, Segment, SegmentFlags, StopOn, derivatives};
 
-use crate::plan_ahead::{Ahead, derivatives, ends};
+use crate::plan_ahead::{Ahead, ends};
 use crate::steps::{Recent, Steps};
 
 /// What a move lacks to the end of a segment, as a share of its time, that is rounding: the move reaches the end, and owes it. A

@@ -3,10 +3,10 @@
 use crate::governor::tuning::{
     APPROACH_JERK_SHARE, HURRY_FACTOR, MAX_RATE_CHANGE, STRAIGHT_ON_JERK_SHARE, STRAIGHT_ON_SHARE,
 };
-use tandem_sdk::{AxisLimits, MAX_AXES, Segment};
+use tandem_sdk::{AxisLimits, MAX_AXES, Segment, derivatives};
 
 use crate::law::stop_s;
-use crate::plan_ahead::{Ahead, Motion, derivatives};
+use crate::plan_ahead::{Ahead, Motion};
 
 /// One point of the plan.
 #[derive(Clone, Copy, Debug, Default)]

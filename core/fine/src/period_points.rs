@@ -1,6 +1,6 @@
 //! Where the plan goes within one fine period: velocity and acceleration at the points that matter.
 
-use tandem_sdk::{AxisLimits, MAX_AXES, Segment, SegmentFlags};
+use tandem_sdk::{AxisLimits, MAX_AXES, Segment, SegmentFlags, derivatives};
 
 use crate::plan_ahead::{Ahead, LOOK_ENTRIES};
 
@@ -134,7 +134,7 @@ impl PeriodPoints {
             let takeback = segment.step_acceleration[axis];
             let lanes = times.iter().zip(&mut speed).zip(&mut acceleration);
             for ((t, speed), acceleration) in lanes {
-                let [velocity, bend] = derivatives(c, *t);
+                let [velocity, bend, _] = derivatives(c, *t);
                 *speed = larger(*speed, velocity.abs() * per_speed);
                 *acceleration = larger(*acceleration, (bend + takeback).abs() * per_acceleration);
             }
@@ -147,22 +147,13 @@ impl PeriodPoints {
     fn point(&mut self, segment: &Segment, t: f64) {
         let point = &mut self.list[self.count];
         for (axis, c) in segment.coefficients[..self.axes].iter().enumerate() {
-            let [velocity, acceleration] = derivatives(c, t);
+            let [velocity, acceleration, _] = derivatives(c, t);
             let takeback = segment.step_acceleration[axis];
             point.velocity[axis] = velocity - segment.step_velocity[axis] + takeback * t;
             point.acceleration[axis] = acceleration + takeback;
         }
         self.count += 1;
     }
-}
-
-/// First and second derivative of a polynomial at `t`.
-#[inline]
-fn derivatives(c: &[f64; 6], t: f64) -> [f64; 2] {
-    [
-        c[1] + t * (2.0 * c[2] + t * (3.0 * c[3] + t * (4.0 * c[4] + t * 5.0 * c[5]))),
-        2.0 * c[2] + t * (6.0 * c[3] + t * (12.0 * c[4] + t * 20.0 * c[5])),
-    ]
 }
 
 /// The larger of two numbers of which the first is one: one instruction, where `f64::max` also looks for NaN there.

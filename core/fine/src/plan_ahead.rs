@@ -5,7 +5,7 @@ use std::slice::Iter;
 
 use rtrb::chunks::ReadChunk;
 use tandem_rings::{MAX_ENTRIES, Queued};
-use tandem_sdk::{MAX_AXES, Segment, SegmentFlags};
+use tandem_sdk::{MAX_AXES, Segment, SegmentFlags, derivatives};
 
 use crate::steps::Steps;
 
@@ -509,15 +509,6 @@ pub fn ends(segment: &Segment) -> bool {
     segment.flags.contains(SegmentFlags::ENDS_AT_REST)
 }
 
-/// First, second and third derivative at `t` of the polynomial `c`.
-pub fn derivatives(c: &[f64; 6], t: f64) -> [f64; 3] {
-    [
-        c[1] + t * (2.0 * c[2] + t * (3.0 * c[3] + t * (4.0 * c[4] + t * 5.0 * c[5]))),
-        2.0 * c[2] + t * (6.0 * c[3] + t * (12.0 * c[4] + t * 20.0 * c[5])),
-        6.0 * c[3] + t * (24.0 * c[4] + t * 60.0 * c[5]),
-    ]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -583,14 +574,6 @@ mod tests {
         assert_eq!(seen(&mut cursor), [[0.5, 0.0, 1.5], [0.0, 1.5, 4.0]]);
         let number = cursor.next_number();
         assert_eq!(cursor.ahead().entries_from(number + 1).count(), 4);
-    }
-
-    #[test]
-    fn derivatives_are_those_of_the_polynomial() {
-        let c = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
-        assert_eq!(derivatives(&c, 1.0), [70.0, 210.0, 504.0]);
-        assert_eq!(derivatives(&c, 2.0), [702.0, 1254.0, 1704.0]);
-        assert_eq!(derivatives(&c, 0.0), [2.0, 6.0, 24.0]);
     }
 
     #[test]

@@ -13,7 +13,7 @@
 //! as half of that at least: with all of it the beginning would be counted twice, and a stop would be expected a tenth too early.
 
 use tandem_rings::MIN_JERK_SHARE;
-use tandem_sdk::{MAX_AXES, Segment};
+use tandem_sdk::{MAX_AXES, Segment, derivatives};
 
 /// By how much the rate has fallen when the plan uses half of the jerk: 1 − 0.8³ is half.
 pub const EASED: f64 = 0.2;
@@ -48,7 +48,7 @@ impl Easing {
         let lanes = segment.coefficients.iter().zip(&self.jerk_mm_per_s3);
         for (c, limit) in lanes.filter(|(_, limit)| limit.is_finite()) {
             for ((t_s, whole), left) in times.iter().zip(&mut whole).zip(&mut left) {
-                let (velocity, jerk) = derivatives(c, *t_s);
+                let [velocity, _, jerk] = derivatives(c, *t_s);
                 if velocity != 0.0 {
                     *whole = smaller(*whole, limit / velocity.abs());
                     let rest = limit + velocity.signum() * jerk;
@@ -65,7 +65,7 @@ impl Easing {
 /// `whole` of the rate's second derivative, 1/s², and the plan leaves `left` of it. What the plan itself brakes with along the path need
 /// not be left.
 fn begins_s(segment: &Segment, t_s: f64, left: f64, whole: f64) -> f64 {
-    let (speed, path_jerk) = derivatives(&segment.path, t_s);
+    let [speed, _, path_jerk] = derivatives(&segment.path, t_s);
     if whole.is_infinite() || speed <= 0.0 {
         return 0.0;
     }
@@ -86,14 +86,6 @@ pub fn easing_s(left: f64, whole_per_s2: f64) -> f64 {
     }
     let eased = |share: f64| (1.0 + 3.0 * EASED / share).acosh();
     (eased(left.max(MIN_JERK_SHARE / 2.0)) - eased(1.0)) / (3.0 * whole_per_s2).sqrt()
-}
-
-/// First and third derivative of the polynomial `c` at `t`.
-fn derivatives(c: &[f64; 6], t: f64) -> (f64, f64) {
-    (
-        c[1] + t * (2.0 * c[2] + t * (3.0 * c[3] + t * (4.0 * c[4] + t * 5.0 * c[5]))),
-        6.0 * c[3] + t * (24.0 * c[4] + t * 60.0 * c[5]),
-    )
 }
 
 #[cfg(test)]

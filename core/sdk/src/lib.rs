@@ -51,7 +51,7 @@ pub use planner::{
     SegmentSink,
 };
 pub use plugin::{Made, Plugin, PluginKind};
-pub use segment::{Edge, Segment, SegmentFlags, StopOn};
+pub use segment::{Edge, Segment, SegmentFlags, StopOn, derivatives, polynomial};
 pub use slice::Slice;
 pub use strategy::{
     Answer, FeedStrategy, FineSample, MAX_SIGNALS, Request, StrategyContext, Window,

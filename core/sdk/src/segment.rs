@@ -211,7 +211,7 @@ impl Segment {
     #[inline]
     pub fn velocity(&self, t_s: f64) -> AxisVector {
         AxisVector(std::array::from_fn(|axis| {
-            polynomial_rate(&self.coefficients[axis], t_s)
+            derivatives(&self.coefficients[axis], t_s)[0]
         }))
     }
 
@@ -219,8 +219,7 @@ impl Segment {
     #[inline]
     pub fn acceleration(&self, t_s: f64) -> AxisVector {
         AxisVector(std::array::from_fn(|axis| {
-            let c = &self.coefficients[axis];
-            2.0 * c[2] + t_s * (6.0 * c[3] + t_s * (12.0 * c[4] + t_s * 20.0 * c[5]))
+            derivatives(&self.coefficients[axis], t_s)[1]
         }))
     }
 
@@ -233,23 +232,42 @@ impl Segment {
     /// Path speed at local time `t_s`, mm/s of program time.
     #[inline]
     pub fn path_speed_mm_per_s(&self, t_s: f64) -> f64 {
-        polynomial_rate(&self.path, t_s)
+        derivatives(&self.path, t_s)[0]
     }
 }
 
+/// Value at `t` of the polynomial with the coefficients `c` of a [`Segment`]. Any loop; does not allocate.
 #[inline]
-fn polynomial(c: &[f64; 6], t: f64) -> f64 {
+pub fn polynomial(c: &[f64; 6], t: f64) -> f64 {
     c[0] + t * (c[1] + t * (c[2] + t * (c[3] + t * (c[4] + t * c[5]))))
 }
 
+/// First, second and third derivative of the same: velocity, acceleration and jerk. What of them is not used is not computed. Any
+/// loop; does not allocate.
 #[inline]
-fn polynomial_rate(c: &[f64; 6], t: f64) -> f64 {
-    c[1] + t * (2.0 * c[2] + t * (3.0 * c[3] + t * (4.0 * c[4] + t * 5.0 * c[5])))
+pub fn derivatives(c: &[f64; 6], t: f64) -> [f64; 3] {
+    [
+        c[1] + t * (2.0 * c[2] + t * (3.0 * c[3] + t * (4.0 * c[4] + t * 5.0 * c[5]))),
+        2.0 * c[2] + t * (6.0 * c[3] + t * (12.0 * c[4] + t * 20.0 * c[5])),
+        6.0 * c[3] + t * (24.0 * c[4] + t * 60.0 * c[5]),
+    ]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn derivatives_are_those_of_the_polynomial() {
+        let c = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
+        assert_eq!(
+            [0.0, 1.0, 2.0].map(|t| polynomial(&c, t)),
+            [1.0, 21.0, 321.0]
+        );
+        assert_eq!(derivatives(&c, 0.0), [2.0, 6.0, 24.0]);
+        assert_eq!(derivatives(&c, 1.0), [70.0, 210.0, 504.0]);
+        assert_eq!(derivatives(&c, 2.0), [702.0, 1254.0, 1704.0]);
+    }
 
     #[test]
     fn derivatives_match_differences() {

@@ -367,10 +367,10 @@ fn periods_of_step(passed: u32) -> u32 {
 mod tests {
     use super::super::Goal;
     use super::*;
-    use crate::plan_ahead::{Ahead, TWO_LINEAR, derivatives};
+    use crate::plan_ahead::{Ahead, TWO_LINEAR};
     use crate::steps::Recent;
     use proptest::prelude::*;
-    use tandem_sdk::{AxisLimits, AxisVector, MAX_AXES, Segment};
+    use tandem_sdk::{AxisLimits, AxisVector, MAX_AXES, Segment, derivatives};
 
     /// X is slower than Y.
     fn limits(acceleration: f64, slower: f64, jerk: f64) -> [AxisLimits; MAX_AXES] {

@@ -1,6 +1,6 @@
 //! What a place of a plan asks of axes and joints when it is driven at another rate.
 
-use tandem_sdk::{Axes, AxisVector, MAX_AXES, Segment, SegmentFlags};
+use tandem_sdk::{Axes, AxisVector, MAX_AXES, Segment, SegmentFlags, derivatives, polynomial};
 
 use super::super::space::JointSpace;
 
@@ -55,10 +55,8 @@ pub struct Point {
 
 /// Value and first two derivatives of a polynomial.
 fn evaluate(c: &[f64; 6], t: f64) -> [f64; 3] {
-    let value = c[0] + t * (c[1] + t * (c[2] + t * (c[3] + t * (c[4] + t * c[5]))));
-    let first = c[1] + t * (2.0 * c[2] + t * (3.0 * c[3] + t * (4.0 * c[4] + t * 5.0 * c[5])));
-    let second = 2.0 * c[2] + t * (6.0 * c[3] + t * (12.0 * c[4] + t * 20.0 * c[5]));
-    [value, first, second]
+    let [first, second, _] = derivatives(c, t);
+    [polynomial(c, t), first, second]
 }
 
 /// How the velocity steps at the ends of a block are made up for. In any window of time the velocity of an entry changes by no more
