@@ -127,11 +127,11 @@ impl FineLoop {
         let started = !(waiting && matches!(self.phase, Phase::Waiting));
         let recorded = (self.outputs.unhomed == 0 || self.config.record_drives)
             && self.phase.handed_over() == 0;
+        let switched = self.switched();
         if started && recorded && !had_ended && !self.outputs.ended {
             let feed = (self.rate.cursor().path_mm() - before_mm) / self.config.period_s;
-            self.publish(&position, feed);
+            self.publish(&position, feed, switched);
         }
-        let switched = self.switched();
         let segment = self.rate.cursor().segment();
         self.report.keep_switched(self.tick, segment, &switched);
         self.tick += u64::from(started);
@@ -587,7 +587,7 @@ impl FineLoop {
     fn exchange(&mut self, axes: &AxisVector) -> bool {
         let lets_go = self.is_letting_go();
         let may_hold =
-            self.fault.is_none() && !lets_go && self.roles.may_enable(&self.config.roles);
+            || self.fault.is_none() && !lets_go && self.roles.may_enable(&self.config.roles);
         let hand = self.phase.hand();
         self.actuation
             .set_joints(&self.config, axes, hand, may_hold, lets_go);
@@ -688,7 +688,10 @@ impl FineLoop {
     /// Axis coordinates of what the drives report, mm or rad. Where the kinematics do not know, the last ones, and a fault.
     #[inline]
     fn axes_of(&mut self, joints: &AxisVector) -> AxisVector {
-        match self.actuation.axes_of(&self.config, joints) {
+        if let Some(axes) = self.actuation.space().axes_alone(joints) {
+            return axes;
+        }
+        match self.actuation.axes_by_kinematics(&self.config, joints) {
             Ok(axes) => axes,
             Err(kind) => {
                 self.lose_way(kind);
@@ -709,7 +712,7 @@ impl FineLoop {
         self.actuation.place(&self.config, joints, &position);
     }
 
-    fn publish(&mut self, command: &AxisVector, feed_mm_per_s: f64) {
+    fn publish(&mut self, command: &AxisVector, feed_mm_per_s: f64, switched: Switched) {
         let reported = self.actuation.drives().feedback().position;
         let (command, feedback) = if self.config.record_drives {
             (*command + *self.actuation.space().offset(), reported)
@@ -717,7 +720,7 @@ impl FineLoop {
             (self.config.axes_alone(command), self.axes_of(&reported))
         };
         let ratio = self.ratios_in_force().feed;
-        let (drives, switched) = (self.actuation.drives(), self.switched());
+        let drives = self.actuation.drives();
         let (answer, segment) = (drives.feedback(), self.rate.cursor().segment());
         let given = self.operator.inputs();
         self.counters.samples += 1;

@@ -90,14 +90,13 @@ impl Actuation {
             .add_joints(config, &self.guard, after_fault, axes, position)
     }
 
-    /// Axis coordinates of `joints`, mm or rad; the fault where the kinematics do not know them.
-    #[inline]
-    pub(super) fn axes_of(
+    /// Axis coordinates of `joints` by the kinematics, mm or rad; the fault where they do not know them.
+    pub(super) fn axes_by_kinematics(
         &mut self,
         config: &FineConfig,
         joints: &AxisVector,
     ) -> Result<AxisVector, FaultKind> {
-        self.space.axes_of(config, joints)
+        self.space.axes_by_kinematics(config, joints)
     }
 
     /// Judges `position` as the next sample; the travel of the axes `unhomed`, a bit each, does not count.
@@ -171,11 +170,11 @@ impl Actuation {
         config: &FineConfig,
         axes: &AxisVector,
         hand: Option<&mut HandOver>,
-        may_hold: bool,
+        may_hold: impl FnOnce() -> bool,
         lets_go: bool,
     ) {
         if !self.attach.is_done() {
-            self.attach.tell(&mut self.drives, may_hold);
+            self.attach.tell(&mut self.drives, may_hold());
             return;
         }
         let mut joints = self.space.joints_of(config, axes);

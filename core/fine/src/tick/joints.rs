@@ -120,34 +120,27 @@ impl JointSpace {
         (self.lead == Lead::Axes).then(|| kinematics.to_joints(position))
     }
 
-    /// Axis coordinates of `joints`, mm or rad; the fault where the kinematics do not know them.
+    /// Axis coordinates of `joints`, mm or rad, where joints are axes.
     #[inline]
-    pub(super) fn axes_of(
+    pub(super) fn axes_alone(&self, joints: &AxisVector) -> Option<AxisVector> {
+        self.kinematics.is_none().then(|| *joints - self.offset)
+    }
+
+    /// The same by the kinematics; the fault where they do not know them.
+    #[inline(never)]
+    pub(super) fn axes_by_kinematics(
         &mut self,
         config: &FineConfig,
         joints: &AxisVector,
     ) -> Result<AxisVector, FaultKind> {
-        if self.kinematics.is_none() {
-            return Ok(*joints - self.offset);
-        }
-        self.axes_by_kinematics(config.axis_count(), joints)
-            .map_err(|axis| FaultKind::WayBack { axis })
-    }
-
-    /// The same by the kinematics, of `axes` axes; the first axis that they do not know, where that is one.
-    #[inline(never)]
-    fn axes_by_kinematics(
-        &mut self,
-        axes: usize,
-        joints: &AxisVector,
-    ) -> Result<AxisVector, usize> {
         let joints = *joints - self.offset;
         let Some(kinematics) = &self.kinematics else {
             return Ok(joints);
         };
         let found = kinematics.to_axes(&joints);
-        if let Some(axis) = (0..axes).find(|axis| !found[*axis].is_finite()) {
-            return Err(axis);
+        let mut axes = 0..config.axis_count();
+        if let Some(axis) = axes.find(|axis| !found[*axis].is_finite()) {
+            return Err(FaultKind::WayBack { axis });
         }
         self.axes = found;
         Ok(found)
