@@ -66,11 +66,11 @@ pub struct Factors<const L: usize> {
     pub per_jerk: Lanes<L>,
 }
 
-/// Three places each of as many intervals as there are lanes, side by side: the rows there.
+/// Three places each of as many intervals as there are lanes, side by side: the rows there. They lie on whole cache lines: half of the
+/// wide loads would cross from one to the next.
 #[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
 struct Sites<const L: usize, const GROUPS: usize> {
-    /// How many there are. Behind the last of all it stands again, and is not counted twice in what is sought.
-    count: usize,
     interval: [usize; WIDE],
     /// 1 where the time of the interval counts here: once for each.
     timed: Wide,
@@ -79,6 +79,8 @@ struct Sites<const L: usize, const GROUPS: usize> {
     /// Of every axis.
     forms: [[Form; GROUPS]; L],
     most: [Wide; PLACES],
+    /// How many there are. Behind the last of all it stands again, and is not counted twice in what is sought.
+    count: usize,
 }
 
 impl<const L: usize, const GROUPS: usize> Sites<L, GROUPS> {

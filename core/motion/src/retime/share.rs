@@ -51,8 +51,9 @@ impl Single {
     };
 }
 
-/// The rows at three places: a group is a pair for every axis.
+/// The rows at three places: a group is a pair for every axis. They lie on whole cache lines.
 #[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
 pub struct Rows<const L: usize, const GROUPS: usize> {
     pub pairs: [[Pair; GROUPS]; L],
     /// What multiplies b in the rows of jerk at each place, in the last pass.

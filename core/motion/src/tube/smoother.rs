@@ -43,8 +43,8 @@ pub struct SmoothStatus {
 
 /// A waypoint as rows `±(B·c − p)/w ≤ 1`, their slacks, multipliers and residuals.
 #[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
 struct Rows<const L: usize> {
-    interval: usize,
     weights: [f64; 4],
     point: Lanes<L>,
     per_half: Lanes<L>,
@@ -53,6 +53,7 @@ struct Rows<const L: usize> {
     residual: [Lanes<L>; 2],
     /// 1 over slack times multiplier: one division gives both their inverses.
     inverse: [Lanes<L>; 2],
+    interval: usize,
 }
 
 /// Smooths; keeps its memory from one time to the next.
@@ -200,7 +201,7 @@ impl<const L: usize> Smoother<L> {
     fn assemble(&mut self, spline: &Spline<L>, target: &Lanes<L>) -> f64 {
         let count = spline.points.len();
         self.matrix.clear();
-        self.matrix.resize(count, [[0.0; L]; 4]);
+        self.matrix.resize(count, Row::ZERO);
         self.step.clear();
         self.step.resize(count, [0.0; L]);
         for k in 0..spline.intervals() {
@@ -233,7 +234,7 @@ impl<const L: usize> Smoother<L> {
             for i in 0..4 {
                 let wi = row.weights[i];
                 for j in i..4 {
-                    let entry = &mut rows[i][j - i];
+                    let entry = &mut rows[i].0[j - i];
                     let w = wi * row.weights[j];
                     *entry = each(|l| entry[l] + w * weight[l]);
                 }
@@ -260,7 +261,7 @@ impl<const L: usize> Smoother<L> {
         let (rows, steps) = system(&mut self.matrix, &mut self.step, k);
         for i in 0..4 {
             for j in i..4 {
-                let entry = &mut rows[i][j - i];
+                let entry = &mut rows[i].0[j - i];
                 *entry = each(|l| entry[l] + D[i] * D[j] * bend[l]);
             }
             let entry = &mut steps[i];
