@@ -109,11 +109,11 @@ impl PeriodPoints {
         let (to_s, middle_s) = (from_s + duration_s, from_s + duration_s / 2.0);
         // One stands for another where there are fewer.
         let (count, times) = if duration_s == 0.0 {
-            (1, [from_s; 4])
+            (1, [from_s; 3])
         } else if (0..self.axes).any(|axis| segment.coefficients[axis][3] != 0.0) {
-            (3, [from_s, to_s, middle_s, middle_s])
+            (3, [from_s, to_s, middle_s])
         } else {
-            (2, [from_s, to_s, to_s, to_s])
+            (2, [from_s, to_s, to_s])
         };
         self.compare(segment, &times);
         if self.keeps_points {
@@ -125,10 +125,10 @@ impl PeriodPoints {
     }
 
     /// Compares with the limits how `segment` moves at several times at once, side by side.
-    fn compare(&mut self, segment: &Segment, times: &[f64; 4]) {
+    fn compare(&mut self, segment: &Segment, times: &[f64; 3]) {
         let per_speed = &self.per_speed[usize::from(segment.flags.contains(SegmentFlags::RAPID))];
-        let mut speed = [self.speed_ratio; 4];
-        let mut acceleration = [self.acceleration_ratio; 4];
+        let mut speed = [self.speed_ratio; 3];
+        let mut acceleration = [self.acceleration_ratio; 3];
         for (axis, c) in segment.coefficients[..self.axes].iter().enumerate() {
             let (per_speed, per_acceleration) = (per_speed[axis], self.per_acceleration[axis]);
             let takeback = segment.step_acceleration[axis];

@@ -42,19 +42,21 @@ impl Easing {
         if segment.order < 3 {
             return 0.0;
         }
-        // At three times side by side; the last one stands for a fourth, so that pairs of them fill registers.
-        let times = [0.0, 0.5, 1.0, 1.0].map(|share| share * segment.duration_s);
-        let [mut whole, mut left] = [[f64::INFINITY; 4]; 2];
+        let times = [0.0, 0.5, 1.0].map(|share| share * segment.duration_s);
+        let [mut whole, mut left] = [[f64::INFINITY; 3]; 2];
         let lanes = segment.coefficients.iter().zip(&self.jerk_mm_per_s3);
         for (c, limit) in lanes.filter(|(_, limit)| limit.is_finite()) {
-            for ((t_s, whole), left) in times.iter().zip(&mut whole).zip(&mut left) {
-                let [velocity, _, jerk] = derivatives(c, *t_s);
+            let mut look = |n: usize, [velocity, _, jerk]: [f64; 3]| {
                 if velocity != 0.0 {
-                    *whole = smaller(*whole, limit / velocity.abs());
+                    whole[n] = smaller(whole[n], limit / velocity.abs());
                     let rest = limit + velocity.signum() * jerk;
-                    *left = smaller(*left, rest / velocity.abs());
+                    left[n] = smaller(left[n], rest / velocity.abs());
                 }
-            }
+            };
+            // At the start they are coefficients.
+            look(0, [c[1], 2.0 * c[2], 6.0 * c[3]]);
+            look(1, derivatives(c, times[1]));
+            look(2, derivatives(c, times[2]));
         }
         let at = |n: usize| begins_s(segment, times[n], left[n], whole[n]);
         [0, 1, 2].map(at).into_iter().fold(0.0, f64::max)

@@ -25,8 +25,10 @@ pub struct Queue {
     sent: usize,
     /// Events whose block has not been emitted yet.
     events: VecDeque<Event>,
-    /// Blocks accepted by the planner, not yet reported, with their curves.
-    blocks: VecDeque<(Block, Option<Arc<NurbsData>>)>,
+    /// Blocks accepted by the planner, not yet reported, and their curves. A block is large: by itself it is copied to its place, and
+    /// forgotten there.
+    blocks: VecDeque<Block>,
+    curves: VecDeque<Option<Arc<NurbsData>>>,
     /// Blocks that wait for an edge, until they are emitted.
     stops: VecDeque<(u64, StopOn)>,
     /// Reports of blocks planned for good since the last look; their blocks are still in `blocks`.
@@ -54,6 +56,7 @@ impl Queue {
             sent: 0,
             events: VecDeque::new(),
             blocks: VecDeque::new(),
+            curves: VecDeque::new(),
             stops: VecDeque::new(),
             reported: Vec::new(),
             emitted_s: 0.0,
@@ -70,7 +73,8 @@ impl Queue {
         if block.stop_on.edge != Edge::None {
             self.stops.push_back((block.index, block.stop_on));
         }
-        self.blocks.push_back((*block, curve.cloned()));
+        self.blocks.extend(std::slice::from_ref(block));
+        self.curves.push_back(curve.cloned());
     }
 
     /// The next rest that the fine loop has reported.
@@ -90,6 +94,7 @@ impl Queue {
         self.sent = 0;
         self.events.clear();
         self.blocks.clear();
+        self.curves.clear();
         self.stops.clear();
         self.reported.clear();
         self.depth.clear();
@@ -122,11 +127,12 @@ impl Queue {
     /// Tells `observer` of the blocks planned for good since the last look, and forgets them.
     pub fn tell_of_blocks(&mut self, observer: &mut dyn Observer) {
         for report in self.reported.drain(..) {
-            while let Some((block, curve)) = self
+            while let Some(block) = self
                 .blocks
                 .front()
-                .filter(|(block, _)| block.index <= report.block)
+                .filter(|block| block.index <= report.block)
             {
+                let curve = self.curves.pop_front().flatten();
                 if block.index == report.block {
                     observer.block(block, curve.as_deref().map(NurbsData::curve), &report);
                 }
@@ -288,14 +294,15 @@ impl SegmentSink for Queue {
 
     fn block(&mut self, report: &BlockReport) {
         let first = self.reported.last().map_or(0, |last| last.block + 1);
-        let place = self.blocks.front().map_or(0, |(front, _)| {
-            report.block.wrapping_sub(front.index) as usize
-        });
+        let place = self
+            .blocks
+            .front()
+            .map_or(0, |front| report.block.wrapping_sub(front.index) as usize);
         if report.block >= first
             && self
                 .blocks
                 .get(place)
-                .is_some_and(|(block, _)| block.index == report.block)
+                .is_some_and(|block| block.index == report.block)
         {
             self.reported.push(*report);
         } else {

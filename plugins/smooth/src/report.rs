@@ -35,19 +35,25 @@ pub fn of_leg<const L: usize>(
     };
     let start = speed(first, from_s);
     let mut peak = start;
-    let mut last = first;
+    // The speed where the last piece looked at is left, and when that is.
+    let mut left = (first, f64::NAN, start);
     // Time by what binds.
     let mut bound_s = [0.0f64; 5];
     for (n, piece) in window.pieces.iter().enumerate().skip(first) {
         if piece.start_s >= to_s {
             break;
         }
-        last = n;
         let until = piece.end_s().min(to_s);
         bound_s[piece.bound as usize] += until - piece.start_s.max(from_s);
-        peak = peak.max(speed(n, until));
+        left = (n, until, speed(n, until));
+        peak = peak.max(left.2);
     }
-    let end = speed(last, to_s);
+    let (last, until, end) = left;
+    let end = if until == to_s {
+        end
+    } else {
+        speed(last, to_s)
+    };
     let driven = window.along(to_s) - leg.start.max(window.along(from_s));
     let whole = leg.end - leg.start;
     let time_s = if driven > 0.0 && leg.end > window.end() + 1e-9 {

@@ -62,6 +62,8 @@ pub struct Reach {
 struct Looker<'a, const L: usize> {
     chords: &'a [Chord<L>],
     at: usize,
+    /// The chords a corner's way behind and before the place looked at last: a node lies near the one before it.
+    ends: [usize; 2],
 }
 
 impl<const L: usize> Looker<'_, L> {
@@ -86,7 +88,7 @@ impl<const L: usize> Looker<'_, L> {
 /// The highest speed, of `most` and downwards, at which a motion that runs over the path around `s` for the time of a corner
 /// keeps acceleration and jerk.
 fn cap<const L: usize>(
-    looker: &Looker<'_, L>,
+    looker: &mut Looker<'_, L>,
     frame: &Frame<L>,
     s: f64,
     most: f64,
@@ -94,7 +96,7 @@ fn cap<const L: usize>(
 ) -> f64 {
     let here = looker.here(s);
     let mut v = most;
-    let [mut behind, mut before] = [looker.at; 2];
+    let [mut behind, mut before] = looker.ends;
     for _ in 0..80 {
         let way = v * corner_s;
         let from = looker.direction_at(s - way, &mut behind);
@@ -112,6 +114,7 @@ fn cap<const L: usize>(
         }
         v *= SLOWER;
     }
+    looker.ends = [behind, before];
     v
 }
 
@@ -172,9 +175,11 @@ impl Timing {
         reach: &Reach,
     ) {
         self.nodes.clear();
+        let at = run.chord_at(reach.s, 0);
         let mut looker = Looker {
             chords: run.chords,
-            at: run.chord_at(reach.s, 0),
+            at,
+            ends: [at; 2],
         };
         let limits = frame.speed[usize::from(run.rapid)];
         let mut s = reach.s;
@@ -197,7 +202,7 @@ impl Timing {
             }
             let corner_s = last_corner.1;
             let most = speed.min(last_cap / (SLOWER * SLOWER * SLOWER * SLOWER));
-            let cap = cap(&looker, frame, s, most, corner_s);
+            let cap = cap(&mut looker, frame, s, most, corner_s);
             last_cap = cap;
             let acceleration = along(&frame.acceleration, &chord.direction);
             let mut node = Node {

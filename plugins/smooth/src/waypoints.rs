@@ -334,7 +334,7 @@ impl<const L: usize> Waypoints<L> {
             let across = (1.0 - t * t).max(1e-6).sqrt();
             need[l] = need[l].max(t * (0.3 / across).min(loose));
         }
-        let worst = farthest(&need, &tangent);
+        let worst = farthest(&need, &tangent, lanes);
         widen(
             each(|l| {
                 (need[l] * (BOX_SHARE / worst)).min(LONGEST.max(LONGEST_MM / tolerance)) * tolerance
@@ -467,9 +467,9 @@ fn tangent<const L: usize>(run: &Run<'_, L>, candidate: &Candidate<L>) -> Option
     (size >= 1.95).then(|| each(|l| sum[l] / size))
 }
 
-/// How far the corners of the box `need` stand off a line through its middle along `tangent`.
+/// How far the corners of the box `need` stand off a line through its middle along `tangent`. Only the first `lanes` have a width.
 #[inline(always)]
-fn farthest<const L: usize>(need: &Lanes<L>, tangent: &Lanes<L>) -> f64 {
+fn farthest<const L: usize>(need: &Lanes<L>, tangent: &Lanes<L>, lanes: usize) -> f64 {
     if L > 4 {
         // A bound: every pair of lanes at its worst.
         let mut sum = 0.0;
@@ -481,6 +481,15 @@ fn farthest<const L: usize>(need: &Lanes<L>, tangent: &Lanes<L>) -> f64 {
         }
         return sum.sqrt();
     }
+    match (need.first_chunk::<3>(), tangent.first_chunk()) {
+        (Some(need), Some(tangent)) if lanes <= 3 => farthest_corner(need, tangent),
+        _ => farthest_corner(need, tangent),
+    }
+}
+
+/// The same of a box with few lanes, corner by corner.
+#[inline(always)]
+fn farthest_corner<const L: usize>(need: &Lanes<L>, tangent: &Lanes<L>) -> f64 {
     let mut most = 0.0f64;
     // The corners are all as far from the middle.
     let reach = dot(need, need);
