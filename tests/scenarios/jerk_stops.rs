@@ -40,48 +40,57 @@ fn stops(seed: u64, draw: &Draw, bench: &Bench, free: &Ran) -> Result<Vec<Stop>,
     let mut stops = vec![];
     for _ in 0..HOLDS {
         let tick = 1 + random.below(free.samples.len() as u64 - 1) as usize;
-        let path_mm: f64 = free.samples[..tick]
-            .iter()
-            .map(|sample| sample.feed_mm_per_s * draw.period_s)
-            .sum();
-        if free.samples[tick - 1].feed_mm_per_s == 0.0 || free.samples[tick].feed_mm_per_s == 0.0 {
-            continue;
-        }
-        let p_s = plan.time_s(path_mm);
-        let least = plan.crude_s(p_s) / draw.period_s;
-        if least < LONG_PERIODS / 3.0 {
-            continue;
-        }
-        let most = (25.0 * least) as usize + 100;
-        let ran = bench
-            .try_commands(&format!("{tick},hold\n{},abort\n", tick + most))
-            .map_err(|e| e.to_string())?;
-        if let Some(fault) = &ran.outcome.summary.fault {
-            return Err(fault.clone());
-        }
-        let taken = ran.samples[tick..]
-            .iter()
-            .position(|sample| sample.feed_mm_per_s == 0.0)
-            .unwrap_or(most) as f64;
-        // Where the bound is near there is nothing to search for.
-        let found = if taken <= NEAR * least {
-            least
-        } else {
-            plan.stop_s(p_s, 1.0) / draw.period_s
-        };
-        let shortest = least.max(found / SLACK);
-        if shortest >= LONG_PERIODS {
-            let what = format!(
-                "seed {seed}, hold at {tick}: {taken} periods, found {found:.1}, at least {least:.1}"
-            );
-            stops.push(Stop {
-                ratio: taken / shortest,
-                bound_ratio: taken / least,
-                what,
-            });
-        }
+        let stop = stop_at(tick, draw, bench, (free, &plan))?;
+        stops.extend(stop.map(|stop| Stop {
+            what: format!("seed {seed}, {}", stop.what),
+            ..stop
+        }));
     }
     Ok(stops)
+}
+
+/// A hold at `tick` of an undisturbed run, where it is one that says something.
+fn stop_at(
+    tick: usize,
+    draw: &Draw,
+    bench: &Bench,
+    (free, plan): (&Ran, &JerkPlan),
+) -> Result<Option<Stop>, String> {
+    let path_mm: f64 = free.samples[..tick]
+        .iter()
+        .map(|sample| sample.feed_mm_per_s * draw.period_s)
+        .sum();
+    if free.samples[tick - 1].feed_mm_per_s == 0.0 || free.samples[tick].feed_mm_per_s == 0.0 {
+        return Ok(None);
+    }
+    let p_s = plan.time_s(path_mm);
+    let least = plan.crude_s(p_s) / draw.period_s;
+    if least < LONG_PERIODS / 3.0 {
+        return Ok(None);
+    }
+    let most = (25.0 * least) as usize + 100;
+    let ran = bench
+        .try_commands(&format!("{tick},hold\n{},abort\n", tick + most))
+        .map_err(|e| e.to_string())?;
+    if let Some(fault) = &ran.outcome.summary.fault {
+        return Err(fault.clone());
+    }
+    let taken = ran.samples[tick..]
+        .iter()
+        .position(|sample| sample.feed_mm_per_s == 0.0)
+        .unwrap_or(most) as f64;
+    // Where the bound is near there is nothing to search for.
+    let found = if taken <= NEAR * least {
+        least
+    } else {
+        plan.stop_s(p_s, 1.0) / draw.period_s
+    };
+    let shortest = least.max(found / SLACK);
+    Ok((shortest >= LONG_PERIODS).then(|| Stop {
+        ratio: taken / shortest,
+        bound_ratio: taken / least,
+        what: format!("hold at {tick}: {taken} periods, found {found:.1}, at least {least:.1}"),
+    }))
 }
 
 fn share(stops: &[Stop], of: f64) -> usize {
@@ -146,6 +155,19 @@ fn holds_on_nurbs_take_little_more_than_the_shortest() {
         7,
         0.99,
     );
+}
+
+/// The plan gets slower and faster again by itself at two corners, with all of the jerk of an axis.
+#[test]
+fn a_plan_that_brakes_for_a_corner_is_not_taken_for_a_stop() {
+    let draw = Draw::new("watched-smooth", 17);
+    let folder = tempfile::tempdir().unwrap();
+    let bench = on(&draw, folder.path());
+    let free = bench.try_commands("").unwrap();
+    let plan = JerkPlan::new(&free.segments, &draw.lanes);
+    let stop = stop_at(86, &draw, &bench, (&free, &plan)).unwrap().unwrap();
+    println!("{:.3}: {}", stop.ratio, stop.what);
+    assert!(stop.ratio < MOST, "{:.3}: {}", stop.ratio, stop.what);
 }
 
 /// On a line at constant speed the shortest stop has a closed form.

@@ -240,15 +240,17 @@ impl Governor {
         if over == 0.0 && along == 0.0 {
             return free.min(0.0);
         }
-        let asked = to_rest(
-            over - h * along / 2.0,
-            along,
-            horizon.approach_jerk_share * path_jerk,
-            APPROACH_END_FACTOR * path_jerk,
-            h,
-        );
+        let gentle = horizon.approach_jerk_share * path_jerk;
+        let towards = |along: f64| {
+            let last = APPROACH_END_FACTOR * path_jerk;
+            to_rest(over - h * along / 2.0, along, gentle, last, h)
+        };
         let planned = sigma * (sigma * sigma * jerk + 3.0 * acceleration * rate);
-        let capped = (asked - planned) / speed;
+        let mut capped = (towards(along) - planned) / speed;
+        if matches!(aim.goal, Goal::Rest { .. }) {
+            // A plan that brakes by itself, for a corner or a turn, gets faster again behind it: that is no stop, and no reason to ease.
+            capped = capped.min(towards(speed * rate) / speed);
+        }
         // At its bound the law of the rate only says that its aim is far.
         if free < most {
             free.min(capped)
