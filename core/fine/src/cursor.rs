@@ -426,6 +426,29 @@ mod tests {
     }
 
     #[test]
+    fn what_comes_next_is_known_before_it_is_driven() {
+        let (mut input, output) = RingBuffer::new(8);
+        for (line, epoch) in [(3, 0), (4, 1)] {
+            let mut segment = Segment::rest(&AxisVector::ZERO, 1.0);
+            (segment.line, segment.epoch, segment.feed_mm_per_s) = (line, epoch, 10.0);
+            segment.stop_on.input = line;
+            let start_s = 0.0;
+            input.push(Queued::Segment { start_s, segment }).unwrap();
+        }
+        let mut cursor = Cursor::new(output, &AxisVector::ZERO);
+        assert_eq!((cursor.next_line(), cursor.next_number()), (Some(3), 0));
+        assert_eq!(cursor.next_stop_on().input, 3);
+        cursor.end_epoch(&AxisVector::ZERO);
+        assert_eq!(cursor.next_stop_on().input, 4, "of this epoch");
+        assert!(cursor.drop_older());
+        assert_eq!((cursor.next_line(), cursor.next_number()), (Some(4), 1));
+        cursor.advance(2.0, |_| false);
+        assert_eq!((cursor.next_line(), cursor.next_number()), (None, 2));
+        assert!(cursor.is_last() && !cursor.drop_older());
+        assert_eq!(cursor.next_stop_on(), StopOn::default());
+    }
+
+    #[test]
     fn what_was_queued_before_the_epoch_ended_is_passed_over() {
         let (mut input, output) = RingBuffer::new(8);
         let mut push = |block: u64, epoch: u32, start_s: f64| {

@@ -268,3 +268,62 @@ impl Governor {
         f64::midpoint(self.sigma, sigma) * self.period_s
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_program_time_of_a_rate_is_what_passes_when_it_is_taken() {
+        let mut governor = Governor::new(&[AxisLimits::unlimited(); MAX_AXES], 1, 0.002);
+        governor.jump(0.5);
+        assert_eq!((governor.sigma(), governor.rate_per_s()), (0.5, 0.0));
+        let passes_s = governor.program_time_s(0.9);
+        assert!((passes_s - 0.7 * 0.002).abs() < 1e-15);
+        assert_eq!(governor.take(0.9), passes_s);
+        assert_eq!(governor.sigma(), 0.9);
+        assert!((governor.rate_per_s() - 0.4 / 0.002).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_plan_beyond_its_limits_is_slowed_as_far_as_they_ask() {
+        let mut points = PeriodPoints::new(&[AxisLimits::unlimited(); MAX_AXES], 1);
+        for (speed, acceleration, limit) in [
+            (1.0, 1.0, 1.0),
+            (1.0 + 0.5 * TOLERANCE, 0.0, 1.0),
+            (1.25, 1.0, 0.8),
+            (1.25, 4.0, 0.5),
+        ] {
+            (points.speed_ratio, points.acceleration_ratio) = (speed, acceleration);
+            assert_eq!(
+                Governor::plan_limit(&points),
+                limit,
+                "{speed} {acceleration}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_speed_of_nothing_is_rest_and_a_feed_is_kept_where_one_is_asked_for() {
+        let aim = |goal, ratio| Aim {
+            goal,
+            ratio,
+            kept_rate: ratio,
+            path: [0.0; 3],
+        };
+        let rest = Goal::run(0.7, 0.0, None);
+        assert!(rest.is_rest() && rest.sigma() == 0.7 && rest.speed_mm_per_s() == 0.0);
+        let run = Goal::run(0.7, 5.0, None);
+        assert!(!run.is_rest() && run.sigma() == 0.7 && run.speed_mm_per_s() == 5.0);
+        let free = Goal::run(1.0, f64::INFINITY, None);
+        for (goal, ratio, keeps) in [
+            (rest, f64::INFINITY, false),
+            (rest, 0.5, true),
+            (run, f64::INFINITY, true),
+            (free, 0.5, true),
+            (free, f64::INFINITY, false),
+        ] {
+            assert_eq!(aim(goal, ratio).keeps_feed(), keeps, "{goal:?} {ratio}");
+        }
+    }
+}

@@ -135,6 +135,43 @@ mod tests {
         }
     }
 
+    #[test]
+    fn a_braking_under_way_that_is_more_than_enough_counts_as_if_it_went_on_as_it_is() {
+        let enough = Along {
+            speed_mm_per_s: 10.0,
+            acceleration_mm_per_s2: -1000.0,
+            max_mm_per_s2: 2000.0,
+            jerk_mm_per_s3: 10_000.0,
+        };
+        assert_eq!(enough.way_to_mm(5.0), 5.0 * 10.0 / 1000.0);
+        assert_eq!(enough.way_to_mm(20.0), 0.0);
+    }
+
+    #[test]
+    fn the_sampled_law_reaches_rest_in_the_shortest_time_and_stays_there() {
+        let h = 0.001;
+        for (from, gentle, most) in [(1.0, 50.0, 50.0), (-0.3, 20.0, 60.0), (0.002, 30.0, 30.0)] {
+            let (mut x, mut rate, mut periods) = (from, 0.0, 0);
+            let peak = (2.0 * f64::abs(from) / (1.0 / most + 1.0 / gentle)).sqrt();
+            let shortest_s = peak / most + peak / gentle;
+            while f64::abs(x) > 1e-9 || f64::abs(rate) > 1e-9 {
+                let change = to_rest(x - h * rate / 2.0, rate, gentle, most, h);
+                assert!(change.abs() <= most);
+                x += h * (rate + h * change / 2.0);
+                rate += h * change;
+                periods += 1;
+                assert!(x * from > -2.0 * gentle * h * h, "it goes beyond: {x}");
+                assert!(
+                    f64::from(periods) * h < 1.02 * shortest_s + 5.0 * h,
+                    "{from}: {x}, {rate}"
+                );
+            }
+            assert!(f64::from(periods) * h > 0.98 * shortest_s);
+            assert_eq!(to_rest(0.0, 0.0, gentle, most, h), 0.0);
+        }
+        assert_eq!(to_rest(1.0, 0.0, 0.0, 1.0, h), 0.0);
+    }
+
     proptest! {
         /// Whatever the deceleration, the feeds and the period are: the end speed is met at the place, never gone below on the
         /// way, and no period brakes harder than it may.

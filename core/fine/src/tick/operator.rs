@@ -139,3 +139,98 @@ impl Operator {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rtrb::{Producer, RingBuffer};
+
+    fn operator() -> (Operator, Arc<Controls>, Producer<StrategyRequest>) {
+        let (input, output) = RingBuffer::new(8);
+        let controls = Arc::new(Controls::default());
+        (
+            Operator::new(Arc::clone(&controls), output),
+            controls,
+            input,
+        )
+    }
+
+    #[test]
+    fn a_jog_is_let_go_where_nobody_keeps_it_alive_for_as_many_periods() {
+        let (mut operator, controls, _requests) = operator();
+        for _ in 0..100 {
+            operator.begin_period(false);
+        }
+        assert!(!operator.is_jog_let_go(), "nothing needs to be kept alive");
+        controls.jog.max_periods.store(4, Relaxed);
+        for beat in 1..10 {
+            controls.jog.beats.store(beat, Relaxed);
+            (0..4).for_each(|_| operator.begin_period(false));
+            assert!(!operator.is_jog_let_go());
+        }
+        operator.begin_period(false);
+        assert!(operator.is_jog_let_go());
+        // Periods that went by without a sample are time as well.
+        controls.jog.let_go.store(false, Relaxed);
+        controls.jog.beats.store(10, Relaxed);
+        operator.begin_period(false);
+        operator.miss_beats(2);
+        operator.begin_period(false);
+        assert!(!operator.is_jog_let_go());
+        operator.begin_period(false);
+        assert!(operator.is_jog_let_go());
+    }
+
+    #[test]
+    fn a_request_acts_in_its_tick_and_counts_as_late_after_it() {
+        let (mut operator, controls, mut requests) = operator();
+        for (tick, kind) in [(3, RequestKind::Hold), (4, RequestKind::Fault)] {
+            requests.push(StrategyRequest { tick, kind }).unwrap();
+        }
+        assert_eq!(operator.take_requests(2), 0);
+        assert!(!operator.is_held());
+        assert_eq!(operator.take_requests(3), 0);
+        assert!(operator.is_held() && operator.inputs().hold, "at once");
+        assert!(!operator.has_soft_fault());
+        assert_eq!(
+            operator.take_requests(6),
+            1,
+            "it was meant for another tick"
+        );
+        assert!(operator.has_soft_fault());
+        operator.begin_period(false);
+        assert!(operator.is_held(), "until the operator resumes");
+        controls.hold.store(false, Relaxed);
+        operator.begin_period(false);
+        assert!(!operator.is_held());
+    }
+
+    #[test]
+    fn holds_act_when_they_say_and_an_abort_leaves_none() {
+        let (mut operator, controls, _requests) = operator();
+        operator.hold_from_next_period();
+        assert!(!operator.is_held());
+        operator.begin_period(false);
+        assert!(operator.is_held());
+        controls.hold.store(false, Relaxed);
+        operator.begin_period(false);
+        operator.hold_for_program();
+        assert!(operator.is_held() && controls.program_hold.load(Relaxed));
+        controls.abort.store(true, Relaxed);
+        controls.jog.let_go.store(true, Relaxed);
+        operator.begin_period(true);
+        assert!(
+            !operator.inputs().abort,
+            "nothing of the job is left to be aborted"
+        );
+        operator.begin_period(false);
+        assert!(operator.inputs().abort);
+        operator.forget_abort();
+        operator.begin_period(false);
+        assert!(!operator.is_held() && !operator.inputs().abort && operator.is_jog_let_go());
+        operator.press_emergency_stop();
+        assert!(operator.inputs().emergency_stop && !operator.lets_drives_go());
+        controls.let_go.store(true, Relaxed);
+        assert!(operator.lets_drives_go());
+    }
+}

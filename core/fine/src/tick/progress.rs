@@ -103,3 +103,117 @@ impl Progress {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rtrb::{Producer, RingBuffer};
+    use tandem_rings::Queued;
+    use tandem_sdk::{AxisLimits, AxisVector, Limits, Segment, SegmentFlags};
+
+    const PERIOD_S: f64 = 0.001;
+
+    fn config(order: u32) -> FineConfig {
+        let axis = |feed_mm_per_s, rapid_mm_per_s| AxisLimits {
+            feed_mm_per_s,
+            rapid_mm_per_s,
+            acceleration_mm_per_s2: 1000.0,
+            jerk_mm_per_s3: 5000.0,
+            ..AxisLimits::unlimited()
+        };
+        let limits = Limits::new(&[axis(100.0, 50.0), axis(10.0, 150.0)]).unwrap();
+        FineConfig {
+            order,
+            ..FineConfig::new(PERIOD_S, limits)
+        }
+    }
+
+    /// In motion on the first of two segments of a second, and the end of the queue that more may come from.
+    fn cursor() -> (Cursor, Producer<Queued>) {
+        let (mut input, output) = RingBuffer::new(8);
+        for start_s in [0.0, 1.0] {
+            let mut segment = Segment::rest(&AxisVector::ZERO, 1.0);
+            segment.flags = SegmentFlags::default();
+            input.push(Queued::Segment { start_s, segment }).unwrap();
+        }
+        let mut cursor = Cursor::new(output, &AxisVector::ZERO);
+        cursor.advance(0.1, |_| false);
+        (cursor, input)
+    }
+
+    #[test]
+    fn a_window_is_derived_from_the_longest_way_to_the_highest_speed() {
+        assert_eq!(Progress::new(&config(2)).max_periods, 4 * 150 + 32);
+        assert_eq!(Progress::new(&config(3)).max_periods, 4 * (150 + 200) + 32);
+    }
+
+    #[test]
+    fn what_gets_on_by_less_than_a_period_of_the_least_rate_asked_for_is_a_fault_after_the_window()
+    {
+        let ((mut cursor, _input), mut progress) = (cursor(), Progress::new(&config(2)));
+        let watch = |progress: &mut Progress, cursor: &Cursor, ask, ratio: f64| {
+            progress.watch(cursor, ask, Reached::Inside, PERIOD_S, || ratio)
+        };
+        let first = watch(&mut progress, &cursor, Ask::Run, 1.0);
+        assert_eq!(first, None, "it has got on since the start");
+        progress.ask(0.5);
+        progress.ask(0.8);
+        let most = progress.max_periods;
+        cursor.advance(0.4 * PERIOD_S, |_| false);
+        let stand = |progress: &mut Progress, cursor: &Cursor| {
+            (1..=most).all(|_| watch(progress, cursor, Ask::Run, 1.0).is_none())
+        };
+        assert!(stand(&mut progress, &cursor));
+        let mut again = copy_of(&progress);
+        let Some(FaultKind::NoProgress {
+            periods,
+            grown_s,
+            asked,
+        }) = again.watch(&cursor, Ask::Run, Reached::Inside, PERIOD_S, || 1.1e-8)
+        else {
+            panic!("no fault")
+        };
+        assert_eq!((periods, asked), (most + 1, 0.5));
+        assert!((grown_s - 0.4 * PERIOD_S).abs() < 1e-12, "{grown_s} s");
+        // A hold, and a ratio of nothing, ask for nothing; what has got on by enough begins anew.
+        for (ask, ratio, further_s) in [
+            (Ask::Hold, 1.0, 0.0),
+            (Ask::Run, 0.9e-8, 0.0),
+            (Ask::Run, 1.0, 0.2 * PERIOD_S),
+        ] {
+            let mut again = copy_of(&progress);
+            cursor.advance(further_s, |_| false);
+            let found = again.watch(&cursor, ask, Reached::Inside, PERIOD_S, || ratio);
+            assert_eq!((found, again.periods), (None, 0), "{ask:?} {ratio}");
+        }
+    }
+
+    fn copy_of(progress: &Progress) -> Progress {
+        Progress { ..*progress }
+    }
+
+    #[test]
+    fn a_rest_further_on_is_progress_and_the_last_one_is_all_there_is() {
+        let ((mut cursor, input), mut progress) = (cursor(), Progress::new(&config(2)));
+        let rest = |progress: &mut Progress, cursor: &Cursor| {
+            let found = progress.watch(cursor, Ask::Run, Reached::Rest, PERIOD_S, || 1.0);
+            assert_eq!(found, None);
+            progress.periods
+        };
+        assert_eq!(rest(&mut progress, &cursor), 0);
+        cursor.advance(1e-6, |_| false);
+        assert_eq!(
+            rest(&mut progress, &cursor),
+            0,
+            "further on, by however little"
+        );
+        assert_eq!(rest(&mut progress, &cursor), 1, "the same rest");
+        cursor.advance(5.0, |_| false);
+        drop(input);
+        assert!(cursor.is_last());
+        assert_eq!(rest(&mut progress, &cursor), 0);
+        assert_eq!(rest(&mut progress, &cursor), 0, "nothing is left to do");
+        let stands = progress.watch(&cursor, Ask::Run, Reached::Wall, PERIOD_S, || 1.0);
+        assert_eq!((stands, progress.periods), (None, 1), "at a wall there is");
+    }
+}

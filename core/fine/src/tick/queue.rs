@@ -67,3 +67,71 @@ impl QueueWatch {
         self.starved
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::Ordering::Release;
+
+    const PERIOD_S: f64 = 0.001;
+
+    /// A queue that ends at 1 s of program time, in motion, with 100 mm/s² to brake with.
+    fn depth(stop_s: f64) -> Depth {
+        let depth = Depth::default();
+        depth.begin(0, 0.0);
+        depth.wall_s.store(1.0);
+        depth.stop_deceleration_mm_per_s2.store(100.0);
+        depth.stop_s.store(stop_s);
+        depth.build_up_s.store(0.05);
+        depth.required_s.store(0.5);
+        depth
+    }
+
+    #[test]
+    fn a_queue_starves_where_what_is_left_of_it_is_shorter_than_a_stop() {
+        for (longest_s, stop_s) in [(10.0, 25.0 / 100.0), (0.2, 0.5 * 0.2)] {
+            let needed_s = stop_s / STOP_SHARE + 0.05 + 3.0 * PERIOD_S;
+            for (spare_s, starves) in [(1e-6, false), (-1e-6, true)] {
+                let (depth, mut watch) = (depth(longest_s), QueueWatch::default());
+                let now_s = 1.0 - needed_s - spare_s;
+                assert_eq!(watch.look(&depth, now_s, 0.5, 50.0, PERIOD_S), starves);
+                assert_eq!(watch.is_starved(), starves, "{longest_s} {spare_s}");
+            }
+        }
+        let mut watch = QueueWatch::default();
+        let stands = watch.look(&depth(10.0), 0.9999, 0.0, 50.0, PERIOD_S);
+        assert!(!stands, "what stands needs no queue");
+    }
+
+    #[test]
+    fn it_starves_once_until_enough_is_queued_again_or_an_epoch_ends() {
+        let (depth, mut watch) = (depth(10.0), QueueWatch::default());
+        assert!(watch.look(&depth, 0.9, 1.0, 50.0, PERIOD_S));
+        assert!(
+            !watch.look(&depth, 0.9, 1.0, 50.0, PERIOD_S),
+            "it has begun before"
+        );
+        assert!(watch.is_starved());
+        depth.wall_s.store(1.5);
+        assert!(!watch.look(&depth, 0.9, 1.0, 50.0, PERIOD_S));
+        assert!(!watch.is_starved(), "motion may start");
+        assert!(watch.look(&depth, 1.45, 1.0, 50.0, PERIOD_S));
+        watch.forget();
+        assert!(!watch.is_starved());
+    }
+
+    #[test]
+    fn a_full_ring_starves_only_where_nobody_looks_after_it() {
+        let (depth, mut watch) = (depth(10.0), QueueWatch::default());
+        depth.full.store(true, Release);
+        depth.served_for_s.store(4.5 * PERIOD_S);
+        for served in 1..20 {
+            depth.served.store(served, Release);
+            assert!(!watch.look(&depth, 0.9, 1.0, 50.0, PERIOD_S));
+        }
+        for unserved in 1..=4 {
+            assert!(!watch.look(&depth, 0.9, 1.0, 50.0, PERIOD_S), "{unserved}");
+        }
+        assert!(watch.look(&depth, 0.9, 1.0, 50.0, PERIOD_S));
+    }
+}

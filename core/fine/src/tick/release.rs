@@ -82,3 +82,71 @@ impl Release {
         self.is_over |= closed || self.periods >= max_periods;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::FineConfig;
+    use tandem_rig::Echo;
+    use tandem_sdk::{AxisLimits, Limits};
+
+    /// The drives of two joints, told to hold or to let go, that answer with this state.
+    fn drives(holds: bool, answered: JointState) -> Drives {
+        let limits = Limits::new(&[AxisLimits::unlimited(); 2]).unwrap();
+        let echo = Echo::new(move |_, feedback| {
+            feedback.state[1] = answered;
+            Ok(())
+        });
+        let mut drives = Drives::new(&FineConfig::new(0.001, limits), Box::new(echo), 2);
+        drives.tell_to_hold(holds, false);
+        drives.exchange(0, &mut None);
+        drives
+    }
+
+    #[test]
+    fn drives_let_go_behind_the_end_unless_another_job_may_follow() {
+        let mut release = Release::default();
+        assert!(!release.is_due(false) && !release.may_be_followed());
+        release.begin_period(true);
+        assert!(release.is_due(false));
+        release.stay();
+        assert!(!release.is_due(false) && release.stays_enabled(false));
+        assert!(
+            release.is_due(true) && !release.stays_enabled(true),
+            "they are told to"
+        );
+        release.begin_period(false);
+        assert!(!release.is_due(true), "the program goes on");
+        release.begin();
+        assert!(release.is_due(false), "what has begun goes on");
+        release.forget();
+        assert!(!release.is_due(true) && release.may_be_followed());
+    }
+
+    #[test]
+    fn the_exchange_goes_on_until_no_drive_holds_or_its_time_is_over() {
+        let open = drives(false, JointState::Disabled);
+        let holding = [
+            JointState::Enabling,
+            JointState::Enabled,
+            JointState::Homing,
+            JointState::QuickStop,
+        ];
+        for state in holding {
+            let (mut release, still) = (Release::default(), drives(false, state));
+            release.watch(&drives(true, state), false, 1);
+            assert!(!release.is_over(), "they are told to hold");
+            release.watch(&still, false, 3);
+            release.watch(&still, false, 3);
+            assert!(!release.is_over(), "{state:?}");
+            release.watch(&still, false, 3);
+            assert!(release.is_over(), "{state:?}");
+            let mut release = Release::default();
+            release.watch(&still, true, 3);
+            assert!(release.is_over(), "a driver that failed knows of no brakes");
+        }
+        let mut release = Release::default();
+        release.watch(&open, false, 3);
+        assert!(release.is_over());
+    }
+}
