@@ -19,6 +19,7 @@ pub struct Feeds<'a, const L: usize> {
 
 impl<const L: usize> Feeds<'_, L> {
     /// The feed of interval `k`.
+    #[inline(always)]
     pub fn of(&mut self, k: usize) -> f64 {
         while self.at + 1 < self.waypoints.len()
             && (self.waypoints[self.at + 1].interval as usize) < k

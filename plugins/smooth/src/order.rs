@@ -23,6 +23,7 @@ impl Order {
     /// Finds the places of `samples` in a motion to `end` that follows the path: each within tolerance of the path, none before
     /// that of the sample before; false where there are none. Samples before `begin` are those of another window; where it is
     /// left the path is near chord `near`.
+    #[inline(always)]
     pub fn walk<const L: usize>(
         &mut self,
         run: &Run<'_, L>,

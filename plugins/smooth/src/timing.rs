@@ -75,6 +75,7 @@ impl<const L: usize> Looker<'_, L> {
     }
 
     /// The direction here: at a vertex the mean.
+    #[inline(always)]
     fn here(&self, s: f64) -> Lanes<L> {
         let chord = &self.chords[self.at];
         if self.at > 0 && s <= chord.s + 1e-9 {
@@ -87,6 +88,7 @@ impl<const L: usize> Looker<'_, L> {
 
 /// The highest speed, of `most` and downwards, at which a motion that runs over the path around `s` for the time of a corner
 /// keeps acceleration and jerk.
+#[inline(always)]
 fn cap<const L: usize>(
     looker: &mut Looker<'_, L>,
     frame: &Frame<L>,
@@ -120,6 +122,7 @@ fn cap<const L: usize>(
 
 impl Timing {
     /// Times the path from `reach.s` on, behind the `marks` that are known already; the last mark is at rest.
+    #[inline(always)]
     pub fn make<const L: usize>(
         &mut self,
         run: &Run<'_, L>,
@@ -167,6 +170,7 @@ impl Timing {
         }
     }
 
+    #[inline(always)]
     fn place_nodes<const L: usize>(
         &mut self,
         run: &Run<'_, L>,
@@ -235,6 +239,7 @@ impl Timing {
 }
 
 /// Path coordinate of the node behind the one at `s`.
+#[inline(always)]
 fn next_node<const L: usize>(
     run: &Run<'_, L>,
     looker: &Looker<'_, L>,
@@ -281,6 +286,7 @@ fn next_node<const L: usize>(
 }
 
 /// The lane speed along a chord at which path speed reaches the feed.
+#[inline(always)]
 pub fn feed<const L: usize>(chord: &Chord<L>, counted: &Lanes<L>) -> f64 {
     let weighted: Lanes<L> = each(|l| counted[l] * chord.direction[l]);
     let size = weighted.iter().map(|v| v * v).sum::<f64>().sqrt();
@@ -292,6 +298,7 @@ pub fn feed<const L: usize>(chord: &Chord<L>, counted: &Lanes<L>) -> f64 {
 }
 
 /// The speed reached from a node over `way`, at most `cap`. Most nodes are passed at one speed: it is known to be reached.
+#[inline(always)]
 fn reached(from: &Node, cap: f64, way: f64) -> f64 {
     if cap <= from.speed {
         cap
@@ -301,6 +308,7 @@ fn reached(from: &Node, cap: f64, way: f64) -> f64 {
 }
 
 /// The speed gained from a node over `way`: the exact jerk ramp from rest, and 0.8 of the acceleration.
+#[inline(always)]
 fn gain(from: &Node, way: f64) -> f64 {
     let v = from.speed;
     let ramp = v * v.sqrt() + 3.0 * (from.jerk / 2.0).sqrt() * way;

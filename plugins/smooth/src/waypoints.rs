@@ -124,6 +124,7 @@ pub struct Keep<const L: usize> {
 
 impl<const L: usize> Waypoints<L> {
     /// Vertices between two path coordinates, and middles of chords that bulge between them.
+    #[inline(always)]
     pub fn gather(&mut self, run: &Run<'_, L>, from: f64, to: f64) {
         self.candidates.clear();
         let mut i = run.chord_at(from, 0);
@@ -165,6 +166,7 @@ impl<const L: usize> Waypoints<L> {
     /// Chooses waypoints by the timing `marks`: firm ones, others at least a [`DENSE`]th of a step apart, and places between so that no
     /// gap exceeds three quarters of a step. Firm ones that are much nearer than the spline can tell apart are left to the
     /// check. Boxes are what `keep` leaves of them.
+    #[inline(always)]
     pub fn choose(&mut self, run: &Run<'_, L>, marks: &[Mark], grid: Grid, keep: &Keep<L>) {
         self.chosen.clear();
         self.along.clear();
@@ -193,6 +195,7 @@ impl<const L: usize> Waypoints<L> {
     }
 
     /// Places between `last_t` and `t`.
+    #[inline(always)]
     fn fill(
         &mut self,
         run: &Run<'_, L>,
@@ -233,6 +236,7 @@ impl<const L: usize> Waypoints<L> {
         }
     }
 
+    #[inline(always)]
     fn add(
         &mut self,
         run: &Run<'_, L>,
@@ -397,12 +401,14 @@ impl Timer<'_> {
 }
 
 /// Whether the motion is to pass vertex `v` in its time: a sharp turn, or another feed.
+#[inline(always)]
 fn is_marked<const L: usize>(chords: &[Chord<L>], v: usize) -> bool {
     chords[v].turn > SHARP || timely(chords, v).is_finite()
 }
 
 /// How far along the path the motion may be off vertex `v` in its time, mm: where the feed changes, no more than the lower
 /// one covers in a fraction of a fine period. Infinite where it does not change.
+#[inline(always)]
 fn timely<const L: usize>(chords: &[Chord<L>], v: usize) -> f64 {
     let last = chords[v - 1].feed;
     let feed = chords[v].feed;
@@ -440,6 +446,7 @@ impl<const L: usize> Needs<L> {
 }
 
 /// The vertex at the start of chord `v`, which has one before it.
+#[inline(always)]
 fn vertex<const L: usize>(chords: &[Chord<L>], v: usize) -> Vertex<L> {
     let turn = minus(&chords[v].direction, &chords[v - 1].direction);
     let length = f64::midpoint(chords[v].length, chords[v - 1].length);

@@ -39,6 +39,7 @@ pub struct Piece<const L: usize> {
 
 impl<const L: usize> Piece<L> {
     /// The quintic from one state to another.
+    #[inline(always)]
     pub fn between(from: &State<L>, to: &State<L>, start_s: f64, duration_s: f64) -> Self {
         let mut c = [[0.0; L]; 6];
         for l in 0..L {
