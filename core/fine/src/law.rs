@@ -135,6 +135,36 @@ mod tests {
         }
     }
 
+    /// The speeds at the ends of the periods behind it fall by a step each, the last one by what is left, and use up the way.
+    #[test]
+    fn the_speed_towards_a_place_is_the_highest_of_which_whole_periods_of_braking_use_up_the_way() {
+        let (period_s, step) = (0.001, 0.5);
+        for end in [0.0, 0.1, 3.0, 40.0] {
+            for number in 1..400 {
+                let way = f64::from(number * number) * 0.01 + 2.0 * end + 5.0;
+                let from = end + 7.0;
+                let next =
+                    along(from, step / period_s).speed_towards(way * period_s, end, period_s);
+                let above = next - end;
+                let periods = (above / step - 1e-9).ceil().max(1.0);
+                let used = f64::midpoint(from, next) + (periods - 0.5) * above + periods * end
+                    - step * periods * (periods - 1.0) / 2.0;
+                let last = above - (periods - 1.0) * step;
+                assert!(
+                    last > -1e-9 && last < step * (1.0 + 1e-9),
+                    "{way} to {end}: {next}"
+                );
+                let slack = way - used;
+                // Where it ends faster than it can stop in a period, the end speed is kept until the place is there.
+                assert!(
+                    slack > -1e-9 && slack < (end + step) * (1.0 + 1e-9),
+                    "{way} to {end}: {next}, {slack} left"
+                );
+                assert!(end > 0.0 || slack < 1e-9, "{way}: {next}, {slack} left");
+            }
+        }
+    }
+
     #[test]
     fn a_braking_under_way_that_is_more_than_enough_counts_as_if_it_went_on_as_it_is() {
         let enough = Along {

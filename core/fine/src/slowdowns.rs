@@ -231,6 +231,30 @@ mod tests {
     }
 
     #[test]
+    fn a_mark_says_how_the_plan_moves_at_its_place() {
+        let mut slowdowns = Slowdowns::new();
+        for (feed_mm_per_s, path) in [(9.0, [0.0, 9.0, 0.0]), (5.0, [2.0, 3.0, 4.0])] {
+            let mut segment = Segment::rest(&AxisVector::ZERO, 1.0);
+            segment.flags = SegmentFlags::default();
+            segment.feed_mm_per_s = feed_mm_per_s;
+            segment.path[..3].copy_from_slice(&path);
+            slowdowns.see(&segment);
+            segment.flags = SegmentFlags::DWELL;
+            segment.feed_mm_per_s = 1.0;
+            slowdowns.see(&segment);
+        }
+        let marks: Vec<_> = slowdowns.marks().collect();
+        let [mark] = marks[..] else {
+            panic!("{marks:?}")
+        };
+        assert_eq!((mark.path_mm, mark.feed_mm_per_s), (2.0, 5.0));
+        assert_eq!(
+            (mark.speed_mm_per_s, mark.acceleration_mm_per_s2),
+            (3.0, 8.0)
+        );
+    }
+
+    #[test]
     fn a_plan_that_gets_faster_behind_its_place_is_met_slower_but_not_below_half() {
         let slowdown = |acceleration_mm_per_s2: f64| Slowdown {
             path_mm: 0.0,

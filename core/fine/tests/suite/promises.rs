@@ -7,6 +7,7 @@ use std::sync::atomic::Ordering::Relaxed;
 use common::Bench;
 use tandem_fine::{FaultKind, GuardMode};
 use tandem_rings::{MachineState, Sample};
+use tandem_sdk::EventKind;
 
 fn tick(bench: &mut Bench, periods: u32) -> Vec<Sample> {
     let mut samples = vec![];
@@ -120,4 +121,71 @@ fn missed_periods_count_for_the_keep_alive_and_are_counted_to_one() {
     assert!(!bench.host.controls.jog.let_go.load(Relaxed));
     tick(&mut bench, 1);
     assert!(bench.host.controls.jog.let_go.load(Relaxed));
+}
+
+#[test]
+fn a_job_takes_over_the_drives_of_the_one_before_while_they_hold() {
+    let mut first = Bench::new(GuardMode::Stop);
+    first.fine.stay();
+    first.peak(20.0);
+    first.event(EventKind::DigitalOutput, 2, 1.0);
+    first.event(EventKind::ProgramEnd, 0, 0.0);
+    tick(&mut first, 200);
+    assert!(first.fine.has_ended() && first.fine.is_done() && !first.fine.is_over());
+    let stands = first.fine.told_to_joints();
+    assert!(stands[0] > 0.1);
+
+    let mut next = Bench::new(GuardMode::Stop);
+    next.fine.succeed(&mut first.fine, false);
+    assert!(!next.fine.is_attaching(), "they hold");
+    assert_eq!(
+        (next.fine.told_to_joints(), next.fine.sent()),
+        (stands, stands)
+    );
+    next.go_on();
+    next.peak(20.0);
+    let samples = tick(&mut next, 60);
+    assert_eq!(next.fine.fault(), None);
+    assert!(
+        next.fine.told_to_joints()[0] > stands[0],
+        "it moves on from there"
+    );
+    let outputs = samples.iter().map(|sample| sample.switched.outputs);
+    assert!(
+        !samples.is_empty() && outputs.min() == Some(1 << 2),
+        "what was on stays on"
+    );
+    next.fail_drives();
+    tick(&mut next, 1);
+    assert_eq!(
+        next.fine.fault(),
+        None,
+        "its own drives are those of the job before"
+    );
+    first.fail_drives();
+    tick(&mut next, 1);
+    assert_eq!(
+        next.fine.fault().map(|fault| fault.kind),
+        Some(FaultKind::Driver)
+    );
+}
+
+#[test]
+fn a_plan_beyond_its_limits_counts_as_governed_unless_something_asks_for_less() {
+    let mut bench = Bench::new(GuardMode::Stop);
+    bench.accelerate();
+    bench.cruise(2.0);
+    bench.leap(1.0);
+    tick(&mut bench, 300);
+    bench.host.controls.feed_override.store(0.5);
+    tick(&mut bench, 100);
+    bench.host.controls.feed_override.store(1.0);
+    tick(&mut bench, 300);
+    assert_eq!(
+        bench.fine.counters().governed_samples,
+        0,
+        "half the feed was asked for"
+    );
+    tick(&mut bench, 2000);
+    assert!(bench.fine.counters().governed_samples > 0);
 }
