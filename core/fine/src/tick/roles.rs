@@ -58,11 +58,7 @@ impl RoleWatch {
     ) -> Option<FaultKind> {
         if !doing.moves {
             let may_leave = doing.homes || roles.may_leave_limits;
-            self.stood_on = if may_leave {
-                tripped.all & !tripped.old
-            } else {
-                0
-            };
+            self.stood_on = if may_leave { u64::MAX } else { 0 };
         }
         self.stood_on &= tripped.all & !tripped.old;
         let sought = if doing.homes { roles.home_switches } else { 0 };
