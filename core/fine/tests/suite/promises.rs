@@ -129,6 +129,11 @@ fn a_job_takes_over_the_drives_of_the_one_before_while_they_hold() {
     first.fine.stay();
     first.peak(20.0);
     first.event(EventKind::DigitalOutput, 2, 1.0);
+    // Homing calls the place otherwise, which the drives do not see.
+    first.event(EventKind::Correct, 0, 1.5);
+    tick(&mut first, 200);
+    first.go_on();
+    first.dwell(0.01);
     first.event(EventKind::ProgramEnd, 0, 0.0);
     tick(&mut first, 200);
     assert!(first.fine.has_ended() && first.fine.is_done() && !first.fine.is_over());
