@@ -107,7 +107,8 @@ impl FineLoop {
         if holds {
             (self.state, self.roles) = (last.state, std::mem::take(&mut last.roles));
             if !is_placed {
-                self.stand_at(&self.actuation.drives().setpoint().position.clone());
+                let told = self.actuation.drives().setpoint().position;
+                self.stand_at(&told);
             }
             self.actuation.stay_attached();
             self.end_epoch(Stop::of(RestCause::Attached));
@@ -115,7 +116,8 @@ impl FineLoop {
         } else {
             // Where the joints stand is asked of the drives once more.
             if !is_placed {
-                self.stand_at(&self.actuation.drives().feedback().position.clone());
+                let answered = self.actuation.drives().feedback().position;
+                self.stand_at(&answered);
             }
             self.actuation.attach_again(resets);
             self.state = MachineState::Disabled;
