@@ -149,8 +149,8 @@ impl FineLoop {
 
     /// Before a period: what the inputs with a role ask for in it.
     fn watch_roles(&mut self) {
-        let (roles, drives) = (&self.config.roles, self.actuation.drives());
-        let Some(tripped) = self.roles.judge(roles, drives.feedback()) else {
+        let (meant, drives) = (&self.config.roles, self.actuation.drives());
+        let Some(tripped) = self.roles.judge(meant, drives.feedback()) else {
             return;
         };
         self.report.tell_tripped(tripped.all);
@@ -161,13 +161,9 @@ impl FineLoop {
                 && drives.setpoint().velocity != AxisVector::ZERO,
             homes: self.outputs.unhomed != 0,
             holds: self.actuation.all_hold() && (!self.outputs.ended || stays()),
-            awaited: if stop_on.edge == Edge::None {
-                0
-            } else {
-                1 << stop_on.input.min(63)
-            },
+            awaited: roles::awaited(stop_on),
         };
-        if let Some(kind) = self.roles.fault(roles, &tripped, &doing) {
+        if let Some(kind) = self.roles.fault(meant, &tripped, &doing) {
             // What the operator's emergency stop switches off, that of an input does too, whatever has been a fault before.
             if let FaultKind::Input {
                 role: InputFault::EmergencyStop,

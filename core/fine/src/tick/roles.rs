@@ -1,7 +1,7 @@
 //! Inputs with a role: what they ask of the machine, before each period.
 
 use tandem_rings::StopCause;
-use tandem_sdk::Feedback;
+use tandem_sdk::{Edge, Feedback, StopOn};
 
 use crate::fault::{FaultKind, InputFault};
 use crate::roles::{Roles, Tripped};
@@ -29,6 +29,15 @@ pub(super) struct Doing {
     pub(super) holds: bool,
     /// The input that the motion waits for, as a mask.
     pub(super) awaited: u64,
+}
+
+/// The input that a motion waits for, as a mask.
+pub(super) fn awaited(stop_on: &StopOn) -> u64 {
+    if stop_on.edge == Edge::None {
+        0
+    } else {
+        1 << stop_on.input.min(63)
+    }
 }
 
 impl RoleWatch {
