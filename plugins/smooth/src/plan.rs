@@ -554,6 +554,8 @@ fn resting<const L: usize>(run: &Run<'_, L>, start: &Start<'_, L>, end: f64) -> 
 
 /// Share of the tolerance that may lie between two samples before a refused window is to turn more slowly.
 const BULGE: f64 = 0.25;
+/// Least share of the acceleration that one repair leaves it to turn with.
+const SLOWER: f64 = 0.1;
 
 /// The share of the boxes that leaves room for what lies between samples: that does not become less with them.
 fn narrower(boxes: f64, checked: &Checked) -> f64 {
@@ -573,15 +575,16 @@ fn take_back(shares: Shares, checked: &Checked) -> Shares {
             share
         }
     };
-    // Where the motion leaves the path between two samples, it has to turn more slowly.
-    let slower = if checked.deviation > 1.0 && checked.bulge > BULGE {
-        (BULGE / checked.bulge).max(0.3)
+    let acceleration = less(shares.acceleration, checked.acceleration, 0.998);
+    // Where the motion leaves the path between two samples, it has to turn more slowly than it does.
+    let acceleration = if checked.deviation > 1.0 && checked.bulge > BULGE {
+        acceleration.min(checked.acceleration) * (BULGE / checked.bulge).max(SLOWER)
     } else {
-        1.0
+        acceleration
     };
     Shares {
         jerk: less(shares.jerk, checked.jerk, 0.998),
-        acceleration: slower * less(shares.acceleration, checked.acceleration, 0.998),
+        acceleration,
         margin: shares.margin + 2.0 * checked.travel.max(0.0),
         boxes: narrower(shares.boxes, checked),
         feed: less(shares.feed, checked.speed, 0.9995),
