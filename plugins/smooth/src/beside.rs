@@ -4,7 +4,7 @@ use tandem_motion::tube::{Lanes, each};
 
 use crate::frame::{dot, minus, plus};
 use crate::route::Run;
-use crate::verify::larger;
+use crate::verify::{FAR, larger};
 use crate::window::Window;
 
 /// Share of the tolerance that the motion may reach at an instant.
@@ -127,6 +127,10 @@ pub fn closer<const L: usize>(
     let t = f64::midpoint(from_s, to_s);
     let middle = beside(run, usize::midpoint(a.chord, b.chord), &window.state(t)[0]);
     let mut worst = larger(ends, middle.share);
+    if turns_back(run, a, &middle) || turns_back(run, &middle, b) {
+        // Between two samples of this phase, but a slower motion has one there.
+        worst = larger(worst, FAR);
+    }
     for (times, places) in [([from_s, t], (a, &middle)), ([t, to_s], (&middle, b))] {
         // What is too far already need not be known better.
         if worst > 1.0 || worst.is_nan() {
@@ -141,6 +145,23 @@ pub fn closer<const L: usize>(
         worst = larger(worst, between);
     }
     worst
+}
+
+/// Whether the motion goes back from `a` to `b`, by more than two places within tolerance of them may: on a chord behind which,
+/// and before which, the path goes on in much the same direction. Elsewhere the nearest place may be one that is passed at another
+/// time.
+fn turns_back<const L: usize>(run: &Run<'_, L>, a: &Beside<L>, b: &Beside<L>) -> bool {
+    let chord = &run.chords[b.chord];
+    let back = -dot(&minus(&b.point, &a.point), &chord.direction);
+    if a.chord != b.chord || back <= 2.0 * ALLOWED * chord.tolerance {
+        return false;
+    }
+    let before = b.chord.checked_sub(1).and_then(|i| run.chords.get(i));
+    let behind = run.chords.get(b.chord + 1);
+    before
+        .into_iter()
+        .chain(behind)
+        .all(|next| dot(&next.direction, &chord.direction) > 0.0)
 }
 
 /// The squared distance of `point` from the line between `a` and `b`.

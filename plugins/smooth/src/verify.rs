@@ -25,7 +25,7 @@ pub const SPEED: f64 = 1.0;
 pub const ACCELERATION: f64 = 0.9995;
 pub const JERK: f64 = 1.003;
 /// Share of the tolerance beyond which it does not matter how much it is: the boxes of the next try are as narrow as they get.
-const FAR: f64 = 1.4;
+pub const FAR: f64 = 1.4;
 
 /// The largest of each, as a share of what is allowed.
 #[derive(Clone, Copy, Debug, Default)]
