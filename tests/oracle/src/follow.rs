@@ -55,8 +55,10 @@ pub fn follow(path: &Path, commands: &[Position], options: &Options) -> Followed
         return followed;
     };
     followed.end = walker.end(first.last().copied().unwrap_or_default(), &last);
-    // Where a motion to and fro is as short as a period, the first places may lag behind by whole turns of it.
-    if !walker.is_at_end(followed.end)
+    // Where a motion to and fro is as short as a period, the first places may lag behind by whole turns of it. A run that ended
+    // early need not have come to the end of the path, though it may have stopped near it.
+    if !options.ends_early
+        && !walker.is_at_end(followed.end)
         && walker.may_end_at(&last)
         && let Some(places) = walker.any(&followed.chain)
     {

@@ -17,6 +17,9 @@ const SEARCH_AHEAD: f64 = 4.0;
 /// The samples move on by this factor between two such searches, to keep the effort linear.
 const SEARCH_AGAIN: f64 = 1.1;
 
+/// Places whose distances from a sample differ by less are equally near, mm.
+const ROUNDED_MM: f64 = 1e-9;
+
 /// A path, and how far from it samples may lie.
 pub struct Walker<'a> {
     elements: &'a [Element],
@@ -132,11 +135,13 @@ impl<'a> Walker<'a> {
         walk
     }
 
-    /// Where the walk ends: the end of the path if the last sample has reached it, else the place nearest to it.
+    /// Where the walk ends: the end of the path if the last sample has reached it, else the place nearest to it; the first of those
+    /// that rounding tells apart, where the path comes by again.
     pub fn end(&self, from: PathPosition, sample: &Position) -> PathPosition {
         let (mut best, mut best_mm, mut low) = (from, f64::INFINITY, from.fraction);
         for (index, element) in self.elements.iter().enumerate().skip(from.element) {
-            if let Some((fraction, off_mm)) = element.shape.nearer(sample, (low, 1.0), best_mm) {
+            let nearer_mm = best_mm - ROUNDED_MM;
+            if let Some((fraction, off_mm)) = element.shape.nearer(sample, (low, 1.0), nearer_mm) {
                 (best, best_mm) = (
                     PathPosition {
                         element: index,
