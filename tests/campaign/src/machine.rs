@@ -123,6 +123,8 @@ pub struct Drawn {
     pub rough_ms: f64,
     /// Highest feed ratio that may be asked.
     pub max_feed_ratio: f64,
+    /// How long a filter behind the interpolation takes to settle at each rest, ms; 0 where that is no longer than its window.
+    pub settling_ms: f64,
     /// What there is to probe.
     pub probe: Option<Surface>,
 }
@@ -205,6 +207,7 @@ pub fn draw(random: &mut Random, planner: Option<Planner>) -> Drawn {
         fine_ms,
         rough_ms,
         max_feed_ratio,
+        settling_ms: 0.0,
         probe: None,
     };
     drawn.text.key("format", 1);

@@ -9,9 +9,12 @@ use tandem_rig::Random;
 
 use crate::bound::rest_to_rest_s;
 use crate::machine::{Drawn, Planner};
+use crate::run;
 
 /// Samples that a program is meant to take at most, were it driven with a rest at each block.
 const MAX_SAMPLES: f64 = 20_000.0;
+/// Share of the samples that a run may have in which filters settle.
+const SETTLING_SHARE: f64 = 0.5;
 /// Elements at most.
 const MAX_ELEMENTS: u64 = 400;
 
@@ -58,8 +61,29 @@ pub fn draw(random: &mut Random, machine: &Drawn) -> (String, f64) {
             break;
         }
     }
-    program.text.push_str("M2\n");
-    (program.text, budget_s - program.left_s)
+    let mut text = settling_in_time(&program.text, machine);
+    text.push_str("M2\n");
+    (text, budget_s - program.left_s)
+}
+
+/// The lines of `text` up to where the rests between them would take longer to settle than a run may be.
+fn settling_in_time(text: &str, machine: &Drawn) -> String {
+    let mut left_ms = SETTLING_SHARE * run::MAX_SAMPLES as f64 * machine.fine_ms;
+    let mut exact = false;
+    let settles = |line: &&str| {
+        exact = line.starts_with("G61") || (exact && !line.starts_with("G64"));
+        let rests = ["G0", "G4", "G38", "M"]
+            .iter()
+            .any(|word| line.starts_with(word));
+        if exact || rests {
+            left_ms -= machine.settling_ms;
+        }
+        left_ms > 0.0
+    };
+    text.lines()
+        .take_while(settles)
+        .flat_map(|line| [line, "\n"])
+        .collect()
 }
 
 impl Program<'_> {
@@ -316,5 +340,22 @@ impl Program<'_> {
         }
         self.line(&text);
         true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_program_ends_before_its_rests_take_longer_to_settle_than_a_run_may() {
+        let mut machine = crate::machine::draw(&mut Random::new(1), None);
+        machine.fine_ms = 1.0;
+        machine.settling_ms = SETTLING_SHARE * run::MAX_SAMPLES as f64 / 3.5;
+        let text = "G1 X1\nG61\nG1 X2\nG64\nG1 X3\nG0 X4\nG1 X5\nM8\nG1 X6\n";
+        let kept = "G1 X1\nG61\nG1 X2\nG64\nG1 X3\nG0 X4\nG1 X5\n";
+        assert_eq!(settling_in_time(text, &machine), kept);
+        machine.settling_ms = 0.0;
+        assert_eq!(settling_in_time(text, &machine), text);
     }
 }

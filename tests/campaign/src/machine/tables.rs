@@ -4,6 +4,9 @@ use tandem_rig::Random;
 
 use super::{Axis, Drawn, Planner, Surface, rounded};
 
+/// How many of its time constants an exponential filter takes to settle to the last digit.
+const SETTLING_CONSTANTS: f64 = 28.0;
+
 impl Drawn {
     pub(super) fn loops_and_motion(&mut self, random: &mut Random) {
         let text = &mut self.text;
@@ -170,16 +173,13 @@ impl Drawn {
                 }
             }
             Planner::AfterInterpolation => {
-                options.push((
-                    "filter",
-                    random
-                        .pick(&["\"linear\"", "\"bell\"", "\"exponential\""])
-                        .to_string(),
-                ));
-                options.push((
-                    "time_constant_ms",
-                    rounded(random.length(1.0, 200.0)).to_string(),
-                ));
+                let filter = random.pick(&["\"linear\"", "\"bell\"", "\"exponential\""]);
+                let constant_ms = rounded(random.length(1.0, 200.0));
+                if filter == "\"exponential\"" {
+                    self.settling_ms = SETTLING_CONSTANTS * constant_ms;
+                }
+                options.push(("filter", filter.to_string()));
+                options.push(("time_constant_ms", constant_ms.to_string()));
             }
             Planner::Nurbs => {
                 options.push((
