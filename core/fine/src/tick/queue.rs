@@ -33,13 +33,13 @@ impl QueueWatch {
     }
 
     /// Looks at the queue in a fine period of `period_s`, at program time `now_s`, where the machine moves at the rate `sigma` of a
-    /// plan of `planned_mm_per_s`. Gives whether it has begun to starve.
+    /// plan of `planned_mm_per_s`, or is at a rest of it. Gives whether it has begun to starve.
     pub(super) fn look(
         &mut self,
         depth: &Depth,
         now_s: f64,
         sigma: f64,
-        planned_mm_per_s: f64,
+        planned_mm_per_s: Option<f64>,
         period_s: f64,
     ) -> bool {
         let served = depth.served.load(Acquire);
@@ -54,7 +54,7 @@ impl QueueWatch {
             self.starved = !depth.may_start(now_s);
             return false;
         }
-        let speed = sigma * planned_mm_per_s;
+        let speed = sigma * planned_mm_per_s.unwrap_or(0.0);
         let deceleration = depth.stop_deceleration_mm_per_s2.load();
         // The governor keeps a margin, so it brakes with a share of the declared deceleration. The rough loop keeps the ring as deep
         // as this asks, with the same share and the same time of building up (core/rough/src/depth.rs): with a lower share here a ring
@@ -63,7 +63,10 @@ impl QueueWatch {
         let stop_s = stop_s + depth.build_up_s.load() + REACTION_PERIODS * period_s;
         let unserved_s = f64::from(self.unserved) * period_s;
         let deep_as_can_be = depth.full.load(Acquire) && unserved_s <= depth.served_for_s.load();
-        self.starved = speed > 0.0 && wall_s - now_s < stop_s && !deep_as_can_be;
+        let too_short = speed > 0.0 && wall_s - now_s < stop_s && !deep_as_can_be;
+        // A plan may stand for a while without being at rest, a filter that has settled for one: it needs no way to stop, but behind the
+        // wall it gets on no more.
+        self.starved = too_short || (planned_mm_per_s.is_some() && now_s >= wall_s);
         self.starved
     }
 }
@@ -94,28 +97,34 @@ mod tests {
             for (spare_s, starves) in [(1e-6, false), (-1e-6, true)] {
                 let (depth, mut watch) = (depth(longest_s), QueueWatch::default());
                 let now_s = 1.0 - needed_s - spare_s;
-                assert_eq!(watch.look(&depth, now_s, 0.5, 50.0, PERIOD_S), starves);
+                assert_eq!(
+                    watch.look(&depth, now_s, 0.5, Some(50.0), PERIOD_S),
+                    starves
+                );
                 assert_eq!(watch.is_starved(), starves, "{longest_s} {spare_s}");
             }
         }
         let mut watch = QueueWatch::default();
-        let stands = watch.look(&depth(10.0), 0.9999, 0.0, 50.0, PERIOD_S);
+        let stands = watch.look(&depth(10.0), 0.9999, 0.0, Some(50.0), PERIOD_S);
         assert!(!stands, "what stands needs no queue");
+        let mut at_the_wall = |speed| watch.look(&depth(10.0), 1.0, 0.0, speed, PERIOD_S);
+        assert!(!at_the_wall(None), "a rest needs none either");
+        assert!(at_the_wall(Some(0.0)), "a plan that stands gets on no more");
     }
 
     #[test]
     fn it_starves_once_until_enough_is_queued_again_or_an_epoch_ends() {
         let (depth, mut watch) = (depth(10.0), QueueWatch::default());
-        assert!(watch.look(&depth, 0.9, 1.0, 50.0, PERIOD_S));
+        assert!(watch.look(&depth, 0.9, 1.0, Some(50.0), PERIOD_S));
         assert!(
-            !watch.look(&depth, 0.9, 1.0, 50.0, PERIOD_S),
+            !watch.look(&depth, 0.9, 1.0, Some(50.0), PERIOD_S),
             "it has begun before"
         );
         assert!(watch.is_starved());
         depth.wall_s.store(1.5);
-        assert!(!watch.look(&depth, 0.9, 1.0, 50.0, PERIOD_S));
+        assert!(!watch.look(&depth, 0.9, 1.0, Some(50.0), PERIOD_S));
         assert!(!watch.is_starved(), "motion may start");
-        assert!(watch.look(&depth, 1.45, 1.0, 50.0, PERIOD_S));
+        assert!(watch.look(&depth, 1.45, 1.0, Some(50.0), PERIOD_S));
         watch.forget();
         assert!(!watch.is_starved());
     }
@@ -127,11 +136,14 @@ mod tests {
         depth.served_for_s.store(4.5 * PERIOD_S);
         for served in 1..20 {
             depth.served.store(served, Release);
-            assert!(!watch.look(&depth, 0.9, 1.0, 50.0, PERIOD_S));
+            assert!(!watch.look(&depth, 0.9, 1.0, Some(50.0), PERIOD_S));
         }
         for unserved in 1..=4 {
-            assert!(!watch.look(&depth, 0.9, 1.0, 50.0, PERIOD_S), "{unserved}");
+            assert!(
+                !watch.look(&depth, 0.9, 1.0, Some(50.0), PERIOD_S),
+                "{unserved}"
+            );
         }
-        assert!(watch.look(&depth, 0.9, 1.0, 50.0, PERIOD_S));
+        assert!(watch.look(&depth, 0.9, 1.0, Some(50.0), PERIOD_S));
     }
 }

@@ -120,11 +120,13 @@ impl Rate {
     /// Looks at the queue; gives whether it has begun to starve.
     #[inline]
     pub(super) fn look_at_queue(&mut self, period_s: f64) -> bool {
+        let cursor = &self.plan.cursor;
+        let planned_mm_per_s = (!cursor.is_resting()).then(|| cursor.path_speed_mm_per_s());
         self.queue.look(
             &self.depth,
-            self.plan.cursor.program_time_s(),
+            cursor.program_time_s(),
             self.plan.governor.sigma(),
-            self.plan.cursor.path_speed_mm_per_s(),
+            planned_mm_per_s,
             period_s,
         )
     }

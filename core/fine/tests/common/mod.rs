@@ -197,6 +197,11 @@ impl Bench {
         self.piece(0.0, 0.0, duration_s, true);
     }
 
+    /// Queues a plan that stands, and is at no rest.
+    pub fn stand(&mut self, duration_s: f64) {
+        self.piece(0.0, 0.0, duration_s, false);
+    }
+
     /// What is queued from here on waits for an input that never comes.
     pub fn probe(&mut self) {
         self.stop_on = StopOn {

@@ -6,6 +6,7 @@ use std::sync::atomic::Ordering::Relaxed;
 
 use common::Bench;
 use tandem_fine::{FaultKind, GuardMode};
+use tandem_rings::MachineState;
 use tandem_sdk::EventKind;
 
 /// Drives `periods`, and takes the samples.
@@ -69,6 +70,21 @@ fn a_machine_at_rest_that_waits_for_work_makes_no_fault_of_it() {
     bench.brake();
     tick(&mut bench, 10 * LONG);
     assert_eq!(bench.fine.fault(), None);
+}
+
+/// A filter that has settled stands so, and the rough loop is late.
+#[test]
+fn a_plan_that_stands_where_what_is_queued_ends_starves_and_makes_no_fault_of_it() {
+    let mut bench = Bench::new(GuardMode::Stop);
+    bench.stand(0.5);
+    tick(&mut bench, LONG);
+    assert_eq!(bench.fine.fault(), None);
+    assert_eq!(bench.state(), MachineState::Starved);
+    bench.accelerate();
+    bench.brake();
+    tick(&mut bench, LONG);
+    assert_eq!(bench.fine.fault(), None);
+    assert_ne!(bench.state(), MachineState::Starved);
 }
 
 #[test]
