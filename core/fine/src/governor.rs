@@ -245,6 +245,12 @@ impl Governor {
         self.recovery.clear();
     }
 
+    /// Forgets the way that was found last: the rate has stayed as it is since, and the way was for another place of the plan.
+    #[inline]
+    pub fn forget_way(&mut self) {
+        self.recovery.clear();
+    }
+
     /// The highest rate at which the plan itself keeps the limits: 1 unless the planner is defective.
     pub fn plan_limit(points: &PeriodPoints) -> f64 {
         let excess = points.speed_ratio.max(points.acceleration_ratio.sqrt());

@@ -205,6 +205,7 @@ impl PlanFollower {
         let below = ratios.feed < self.max_feed_ratio;
         if self.order >= 3 {
             if self.runs_as_planned(ask, below, &ratios) {
+                self.governor.forget_way();
                 self.recovering = false;
                 return self.covered(self.period_s);
             }
