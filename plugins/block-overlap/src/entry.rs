@@ -137,7 +137,7 @@ impl Entry {
         self.length_mm = block.length_mm;
         let direction = (block.end - block.start) * (1.0 / block.length_mm);
         self.directions = [direction; 2];
-        if rules.has_rotary {
+        if rules.rotary != 0 {
             let moves = |axis: usize| rules.linear >> axis & 1 == 1 && direction[axis] != 0.0;
             self.turns_only = !(0..rules.axes).any(moves);
         }
