@@ -1,4 +1,4 @@
-"""Streams a program with grbl-streamer, as it comes from PyPI: python3 grbl_streamer.py FOLDER TERMINAL PROGRAM."""
+"""Streams a program with grbl-streamer, as it comes from PyPI but for one lock: python3 grbl_streamer.py FOLDER TERMINAL PROGRAM."""
 import sys
 import threading
 import time
@@ -20,7 +20,18 @@ def hear(event, *data):
         finished.set()
 
 
-grbl = GrblStreamer(hear)
+class Streamer(GrblStreamer):
+    """The thread that starts a job and the one that hears `ok` both send lines: where one of them is held up on a busy computer, a line
+    comes behind dozens of later ones, and the machine drives back to it."""
+
+    sending = threading.RLock()
+
+    def _stream(self):
+        with self.sending:
+            super()._stream()
+
+
+grbl = Streamer(hear)
 began = time.monotonic()
 grbl.cnect(terminal, 115200)
 if not booted.wait(10):
