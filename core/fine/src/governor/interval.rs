@@ -54,9 +54,11 @@ impl Interval {
     pub(super) fn keep_acceleration(&mut self, motion: [f64; 2], at: &RateAt, left: f64) {
         let [velocity, acceleration] = motion;
         let planned = at.sigma * at.sigma * acceleration;
+        // σ̈ acts on σ̇ and, where a period is long beside the change of the acceleration, on σ² as well.
+        let passed_s = at.part * at.period_s;
         self.keep(
             planned + velocity * at.rate_per_s,
-            velocity * at.part * at.period_s,
+            (velocity + at.sigma * acceleration * passed_s) * passed_s,
             left.max(planned.abs()),
         );
     }
@@ -96,6 +98,32 @@ impl Interval {
             f64::midpoint(self.low, self.high)
         } else {
             wanted.clamp(self.low, self.high)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The rate falls so fast within a period that σ²q″ changes by more than the margin.
+    #[test]
+    fn acceleration_is_kept_where_the_rate_changes_much_within_a_period() {
+        let (velocity, acceleration, most) = (5.0, 250.0, 300.0);
+        let at = RateAt {
+            sigma: 0.9,
+            rate_per_s: -30.0,
+            part: 1.0,
+            period_s: 0.0013,
+        };
+        let mut interval = Interval::ALL;
+        interval.keep_acceleration([velocity, acceleration], &at, most);
+        for change in [interval.low, interval.high] {
+            let sigma = at.sigma + change * at.period_s * at.period_s / 2.0;
+            let rate = at.rate_per_s + change * at.period_s;
+            let driven = sigma * sigma * acceleration + rate * velocity;
+            let off = (driven.abs() - most).abs() / most;
+            assert!(off < 2e-3, "{driven} mm/s² of {most}");
         }
     }
 }
