@@ -137,10 +137,8 @@ impl Entry {
         self.length_mm = block.length_mm;
         let direction = (block.end - block.start) * (1.0 / block.length_mm);
         self.directions = [direction; 2];
-        if rules.rotary != 0 {
-            let moves = |axis: usize| rules.linear >> axis & 1 == 1 && direction[axis] != 0.0;
-            self.turns_only = !(0..rules.axes).any(moves);
-        }
+        let moves = |axis: usize| rules.linear >> axis & 1 == 1 && direction[axis] != 0.0;
+        self.turns_only = !(0..rules.axes).any(moves);
         self.slope_s2_per_mm = rules.largest(&direction);
         self.set_feed(block, rules, &direction);
     }

@@ -40,8 +40,6 @@ pub struct Rules {
     pub metric: AxisVector,
     /// Bit per linear axis.
     pub linear: u32,
-    /// Bit per rotary axis.
-    pub rotary: u32,
     /// Fine period, s.
     pub tick_s: f64,
     /// By how much the chord between two samples may lie inside a rounded corner, mm.
@@ -121,7 +119,6 @@ impl Rules {
             ],
             metric,
             linear,
-            rotary: !linear & !(u32::MAX << context.axes.count()),
             tick_s,
             sag_mm: squares.sum::<f64>().sqrt() * tick_s * tick_s / 8.0,
             weakest_mm_per_s2: (0..axes.len())
