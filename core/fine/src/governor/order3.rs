@@ -247,7 +247,7 @@ impl Governor {
         };
         let planned = sigma * (sigma * sigma * jerk + 3.0 * acceleration * rate);
         let mut capped = (towards(along) - planned) / speed;
-        if matches!(aim.goal, Goal::Rest { .. }) {
+        if aim.goal.is_rest() {
             // A plan that brakes by itself, for a corner or a turn, gets faster again behind it: that is no stop, and no reason to ease.
             capped = capped.min(towards(speed * rate) / speed);
         }
