@@ -268,7 +268,7 @@ impl FineLoop {
         if self.operator.inputs().abort {
             return self.end_epoch(Stop::of(RestCause::Abort));
         }
-        if self.rate.may_go_on() && self.state == MachineState::Standstill {
+        if self.rate.may_start() && self.state == MachineState::Standstill {
             self.phase = Phase::Following;
         }
         Input::Rest
@@ -479,6 +479,10 @@ impl FineLoop {
     /// At rest: reports it and ends the epoch. Where the reports before have not been taken yet, it waits for that.
     fn end_epoch(&mut self, stop: Stop) -> Input {
         let latch = stop.latch.map(|joints| self.axes_of(&joints));
+        if self.fault.is_some() {
+            // The kinematics do not know where the drives caught the edge: nothing is planned from there.
+            return Input::Trip;
+        }
         let position = self.actuation.position();
         let cursor = self.rate.cursor();
         let is_reported = self.stops.report(Rest {

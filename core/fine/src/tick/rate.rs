@@ -192,18 +192,14 @@ impl Rate {
         )
     }
 
-    /// Whether motion of the first epoch, or of one that has been planned anew, may start.
+    /// Whether motion of the present epoch may start: it has been planned, and enough of it is queued. What is left of older epochs in
+    /// the queue is dropped first, so that there is room for it.
     pub(super) fn may_start(&mut self) -> bool {
-        let is_planned = self.plan.cursor.epoch() == 0
-            || (self.depth.is_of(self.plan.cursor.epoch()) && self.plan.cursor.drop_older());
+        let epoch = self.plan.cursor.epoch();
+        let is_queued = self.plan.cursor.drop_older();
+        // A first epoch with nothing in it is over at once.
+        let is_planned = epoch == 0 || (is_queued && self.depth.is_of(epoch));
         is_planned && self.depth.may_start(self.plan.cursor.program_time_s())
-    }
-
-    /// Whether motion of an epoch after the first may go on.
-    pub(super) fn may_go_on(&mut self) -> bool {
-        let enough = self.depth.is_of(self.plan.cursor.epoch())
-            && self.depth.may_start(self.plan.cursor.program_time_s());
-        self.plan.cursor.drop_older() && enough
     }
 
     /// Rests at `position`; what is queued counts no more.

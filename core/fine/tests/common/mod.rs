@@ -1,15 +1,15 @@
 //! A fine loop with both other ends in the test's hands, and motion along X to feed it.
 
-use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::atomic::{AtomicBool, AtomicU64};
+use std::sync::{Arc, Mutex};
 
 use tandem_fine::{FineConfig, FineLoop, GuardMode, Joints};
 use tandem_rig::Echo;
 use tandem_rings::{HostEnd, MachineState, Queued, RoughEnd, Sizes, bridge};
 use tandem_sdk::{
-    AxisLimits, AxisVector, Edge, Event, EventKind, Kinematics, Limits, PluginError, Segment,
-    SegmentFlags, StopOn,
+    AxisLimits, AxisVector, Edge, Event, EventKind, Kinematics, Latch, Limits, PluginError,
+    Segment, SegmentFlags, StopOn,
 };
 
 /// Fine period, s.
@@ -22,6 +22,9 @@ const PLANNED_MM_PER_S2: f64 = 200.0;
 /// The output that a fault leaves on.
 pub const KEPT_OUTPUT: u32 = 3;
 
+/// The input that a probe waits for.
+const PROBE_INPUT: u32 = 5;
+
 /// What a plan at its limits accelerates with, mm/s²: planners leave a thousandth.
 const MAX_MM_PER_S2: f64 = 999.0;
 
@@ -32,6 +35,7 @@ pub struct Bench {
     rough: RoughEnd,
     failing: Arc<AtomicBool>,
     spoiled: Arc<AtomicBool>,
+    caught_mm: Arc<Mutex<Option<f64>>>,
     quick_stops: Arc<AtomicU64>,
     queued_s: f64,
     x_mm: f64,
@@ -89,9 +93,20 @@ impl Bench {
         });
         let (failing, spoiled): (Arc<AtomicBool>, Arc<AtomicBool>) = Default::default();
         let (fails, spoils) = (Arc::clone(&failing), Arc::clone(&spoiled));
+        let caught_mm = Arc::<Mutex<Option<f64>>>::default();
+        let catches_mm = Arc::clone(&caught_mm);
         let driver = Echo::new(move |_, feedback| {
             if spoils.load(Relaxed) {
                 feedback.position[0] = f64::NAN;
+            }
+            if let Some(at_mm) = *catches_mm.lock().unwrap() {
+                feedback.latches[0] = Latch {
+                    input: PROBE_INPUT,
+                    edge: Edge::Rising as u32,
+                    joints: 1,
+                    before_s: 0.0,
+                    position: AxisVector::from_slice(&[at_mm]),
+                };
             }
             if fails.load(Relaxed) {
                 Err(PluginError::fixed("the drives are lost"))
@@ -108,6 +123,7 @@ impl Bench {
             rough,
             failing,
             spoiled,
+            caught_mm,
             quick_stops,
             queued_s: 0.0,
             x_mm: 0.0,
@@ -130,6 +146,11 @@ impl Bench {
     /// What the first drive reports is no number from the next exchange on.
     pub fn spoil_feedback(&self) {
         self.spoiled.store(true, Relaxed);
+    }
+
+    /// The drives have caught the edge of the probe where their first joint was at `at_mm`.
+    pub fn catch_edge(&self, at_mm: f64) {
+        *self.caught_mm.lock().unwrap() = Some(at_mm);
     }
 
     /// How often the drives were told to stop by themselves.
@@ -202,10 +223,10 @@ impl Bench {
         self.piece(0.0, 0.0, duration_s, false);
     }
 
-    /// What is queued from here on waits for an input that never comes.
+    /// What is queued from here on waits for the input of the probe, which comes with [`Bench::catch_edge`] or never.
     pub fn probe(&mut self) {
         self.stop_on = StopOn {
-            input: 5,
+            input: PROBE_INPUT,
             edge: Edge::Rising,
             miss_is_fault: 1,
         };

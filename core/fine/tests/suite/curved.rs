@@ -5,6 +5,7 @@ use crate::common;
 use std::sync::atomic::Ordering::Relaxed;
 
 use common::{Bench, PERIOD_S};
+use tandem_fine::FaultKind;
 use tandem_rings::{MachineState, Sample};
 use tandem_sdk::{AxisVector, Kinematics, PluginError};
 
@@ -107,4 +108,44 @@ fn kinematics_that_find_no_joints_are_a_fault_with_their_own_words() {
     assert!(bench.fine.fault().is_some());
     let said = bench.fine.plugin_error().map(ToString::to_string);
     assert!(said.is_some_and(|said| said.contains("the elbow is lost")));
+}
+
+/// It finds no axes for joints beyond 100 mm.
+struct Short;
+
+impl Kinematics for Short {
+    fn to_joints(&self, axes: &AxisVector) -> AxisVector {
+        *axes
+    }
+
+    fn to_axes(&self, joints: &AxisVector) -> AxisVector {
+        if joints[0] > 100.0 {
+            AxisVector::from_slice(&[f64::NAN])
+        } else {
+            *joints
+        }
+    }
+}
+
+/// A drive that says it has caught the edge of a probe where the machine cannot be: from such a place nothing is planned.
+#[test]
+fn an_edge_that_was_caught_where_there_are_no_axes_is_a_fault_and_the_drives_are_let_go() {
+    for (caught_mm, is_fault) in [(1.0, false), (900.0, true)] {
+        let mut bench = Bench::with_curved(Box::new(Short));
+        bench.probe();
+        bench.accelerate();
+        bench.cruise(1.0);
+        for _ in 0..200 {
+            bench.fine.tick();
+        }
+        bench.catch_edge(caught_mm);
+        for _ in 0..200 {
+            bench.fine.tick();
+        }
+        let kind = bench.fine.fault().map(|fault| fault.kind);
+        let ends_in_fault = bench.state() == MachineState::Fault;
+        assert_eq!(ends_in_fault, is_fault, "{caught_mm} mm");
+        assert_eq!(kind, is_fault.then_some(FaultKind::WayBack { axis: 0 }));
+        assert_eq!(bench.quick_stops() > 0, is_fault, "{caught_mm} mm");
+    }
 }
