@@ -126,4 +126,59 @@ mod tests {
             assert!(off < 2e-3, "{driven} mm/s² of {most}");
         }
     }
+
+    /// The jerk of an axis at the ends of the interval is what is left of the limit, or a little more than the plan itself takes, and
+    /// `beyond` more than that.
+    #[test]
+    fn jerk_is_kept_to_what_is_left_or_to_what_the_plan_takes_and_no_further() {
+        let (sigma, limit) = (0.8, 1000.0);
+        for (planned_jerk, beyond) in [(300.0, 0.0), (1900.0, 0.0), (-1900.0, 0.0), (300.0, 70.0)] {
+            for (velocity, acceleration, rate_per_s) in [(5.0, 0.0, 0.0), (-5.0, 40.0, 0.3)] {
+                let at = RateAt {
+                    sigma,
+                    rate_per_s,
+                    part: 0.5,
+                    period_s: 0.002,
+                };
+                let mut interval = Interval::ALL;
+                let motion = [velocity, acceleration, planned_jerk];
+                interval.keep_jerk(motion, &at, (900.0, limit), beyond);
+                let of_plan = sigma.powi(3) * planned_jerk;
+                let allowed = f64::max(900.0, of_plan.abs() + MIN_JERK_SHARE * limit) + beyond;
+                for change in [interval.low, interval.high] {
+                    let rate = rate_per_s + 0.5 * 0.002 * change;
+                    let driven = of_plan + 3.0 * acceleration * sigma * rate + velocity * change;
+                    assert!(
+                        (driven.abs() - allowed).abs() < 1e-6,
+                        "{driven} mm/s³ of {allowed}"
+                    );
+                }
+                assert!(interval.low < interval.high);
+            }
+        }
+    }
+
+    #[test]
+    fn an_interval_has_its_ends_and_what_is_between_them_and_an_empty_one_is_met_in_its_middle() {
+        let interval = Interval {
+            low: -2.0,
+            high: 3.0,
+        };
+        for (value, is_in) in [
+            (-2.1, false),
+            (-2.0, true),
+            (0.0, true),
+            (3.0, true),
+            (3.1, false),
+        ] {
+            assert_eq!(interval.contains(value), is_in, "{value}");
+            assert_eq!(interval.nearest(value), value.clamp(-2.0, 3.0));
+        }
+        let empty = Interval {
+            low: 3.0,
+            high: -2.0,
+        };
+        assert!(empty.is_empty() && !interval.is_empty() && !Interval::ALL.is_empty());
+        assert_eq!(empty.nearest(7.0), 0.5);
+    }
 }

@@ -130,3 +130,47 @@ impl Governor {
         change
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan_ahead::{Axes, PlanAhead};
+    use tandem_sdk::{AxisVector, Segment};
+
+    const PERIOD_S: f64 = 0.001;
+
+    /// X is linear, A turns.
+    const X_AND_A: Axes = Axes {
+        count: 2,
+        linear: 0b01,
+        rotary: 0b10,
+    };
+
+    fn stands(segment: &Segment, at_s: f64) -> bool {
+        let place = PlanAhead::new(segment, [&[], &[]], X_AND_A).begin(at_s);
+        is_in_dwell(&place, PERIOD_S)
+    }
+
+    #[test]
+    fn only_what_stands_for_a_while_is_a_dwell() {
+        let dwell = Segment::rest(&AxisVector::ZERO, 0.1);
+        assert!(stands(&dwell, 0.05));
+        assert!(
+            stands(&dwell, 0.1 - 0.1 * PERIOD_S),
+            "it ends in the period"
+        );
+        assert!(!stands(&dwell, 0.1), "it is over");
+        for (axis, path) in [(0, true), (0, false), (1, true), (1, false)] {
+            // From rest with all the jerk that there is: by some nanometres in the period.
+            let mut begins = Segment::rest(&AxisVector::ZERO, 0.1);
+            begins.coefficients[axis][3] = 5000.0;
+            if path {
+                begins.path[3] = 5000.0;
+            }
+            assert!(!stands(&begins, 0.0), "axis {axis}, path {path}");
+        }
+        let mut moves = Segment::rest(&AxisVector::ZERO, 0.1);
+        (moves.coefficients[0][1], moves.path[1]) = (5.0, 5.0);
+        assert!(!stands(&moves, 0.05));
+    }
+}

@@ -248,3 +248,100 @@ impl Governor {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan_ahead::{PlanAhead, TWO_LINEAR};
+    use proptest::prelude::*;
+    use tandem_rings::{MIN_JERK_SHARE, Queued};
+    use tandem_sdk::{AxisLimits, AxisVector, MAX_AXES, Segment, SegmentFlags, derivatives};
+
+    const PERIOD_S: f64 = 0.001;
+    const ACCELERATION: f64 = 1000.0;
+    const JERK: f64 = 20_000.0;
+
+    fn limits() -> [AxisLimits; MAX_AXES] {
+        [AxisLimits {
+            min_mm: -1000.0,
+            max_mm: 1000.0,
+            feed_mm_per_s: 1000.0,
+            rapid_mm_per_s: 1000.0,
+            acceleration_mm_per_s2: ACCELERATION,
+            jerk_mm_per_s3: JERK,
+            speed_difference_mm_per_s: 0.0,
+        }; MAX_AXES]
+    }
+
+    /// A segment that goes on from `before` with this jerk per axis.
+    fn next(before: &Segment, jerk: [f64; 2], duration_s: f64) -> Segment {
+        let mut segment = Segment::rest(&AxisVector::ZERO, duration_s);
+        for (axis, jerk) in jerk.into_iter().enumerate() {
+            let [velocity, acceleration, _] =
+                derivatives(&before.coefficients[axis], before.duration_s);
+            let place = before.position(before.duration_s)[axis];
+            segment.coefficients[axis] =
+                [place, velocity, acceleration / 2.0, jerk / 6.0, 0.0, 0.0];
+        }
+        segment.flags = SegmentFlags::default();
+        segment
+    }
+
+    proptest! {
+        /// σ̈ at either end of the range keeps jerk and acceleration of both axes at every instant of the period, up to what the
+        /// plan itself takes of them; and one of them is used up, so that no more could be taken.
+        #[test]
+        fn the_range_of_a_period_keeps_the_limits_in_all_of_it_and_leaves_nothing_unused(
+            velocity in proptest::array::uniform2(5.0..100.0f64),
+            acceleration in proptest::array::uniform2(-500.0..500.0f64),
+            jerks in proptest::array::uniform4(-0.95..0.95f64),
+            sigma in 0.3..0.9f64, rate in -2.0..2.0f64, at in 0.0..1.0f64, cut in 0.0..1.2f64,
+        ) {
+            let mut first = Segment::rest(&AxisVector::ZERO, 0.004);
+            for axis in 0..2 {
+                first.coefficients[axis] =
+                    [0.0, velocity[axis], acceleration[axis] / 2.0, JERK * jerks[axis] / 6.0, 0.0, 0.0];
+            }
+            first.flags = SegmentFlags::default();
+            let second = next(&first, [JERK * jerks[2], JERK * jerks[3]], 0.1);
+            // The period begins somewhere in the first segment, and mostly ends in the second.
+            let from_s = first.duration_s - (cut * at * PERIOD_S).min(first.duration_s);
+            let queued = [Queued::Segment { start_s: first.duration_s, segment: second }];
+            let way = RateState {
+                sigma,
+                rate_per_s: rate,
+                place: PlanAhead::new(&first, [&queued, &[]], TWO_LINEAR).begin(from_s),
+                recent: Recent::default(),
+            };
+            let limits = limits();
+            let governor = Governor::new(&limits, 2, PERIOD_S);
+            let Some(range) = governor.range(&way, PERIOD_S, &Horizon::new(&limits, 2, PERIOD_S)) else {
+                return Ok(());
+            };
+            for change in [range.low, range.high] {
+                prop_assert!(change.is_finite());
+                let mut most: f64 = 0.0;
+                for step in 0..=200 {
+                    let t = PERIOD_S * f64::from(step) / 200.0;
+                    let (now, turned) = (sigma + t * (rate + t * change / 2.0), rate + t * change);
+                    let local_s = from_s + t * (sigma + t * (rate / 2.0 + t * change / 6.0));
+                    let (segment, local_s) = if local_s < first.duration_s {
+                        (&first, local_s)
+                    } else {
+                        (&second, local_s - first.duration_s)
+                    };
+                    for axis in 0..2 {
+                        let [v, a, j] = derivatives(&segment.coefficients[axis], local_s);
+                        let jerk = now.powi(3) * j + 3.0 * now * turned * a + v * change;
+                        let of_plan = (now.powi(3) * j).abs() / JERK;
+                        let used = jerk.abs() / JERK / f64::max(1.0, of_plan + MIN_JERK_SHARE);
+                        let driven = now * now * a + turned * v;
+                        most = most.max(used).max(driven.abs() / ACCELERATION);
+                    }
+                }
+                prop_assert!(most < 1.02, "{most} of a limit is used");
+                prop_assert!(most > 0.95, "only {most} of a limit is used");
+            }
+        }
+    }
+}

@@ -384,3 +384,129 @@ impl Governor {
         delta_s
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan_ahead::{Ahead, TWO_LINEAR};
+    use proptest::prelude::*;
+    use tandem_sdk::{AxisLimits, AxisVector, MAX_AXES, Segment, SegmentFlags};
+
+    const PERIOD_S: f64 = 0.001;
+
+    fn limits(acceleration: f64, jerk: f64) -> [AxisLimits; MAX_AXES] {
+        [AxisLimits {
+            min_mm: -1000.0,
+            max_mm: 1000.0,
+            feed_mm_per_s: 1000.0,
+            rapid_mm_per_s: 1000.0,
+            acceleration_mm_per_s2: acceleration,
+            jerk_mm_per_s3: jerk,
+            speed_difference_mm_per_s: 0.0,
+        }; MAX_AXES]
+    }
+
+    /// Along X, with these derivatives at its start.
+    fn along_x([speed, acceleration, jerk]: [f64; 3], duration_s: f64) -> Segment {
+        let mut segment = Segment::rest(&AxisVector::ZERO, duration_s);
+        segment.coefficients[0] = [0.0, speed, acceleration / 2.0, jerk / 6.0, 0.0, 0.0];
+        segment.path = segment.coefficients[0];
+        segment.flags = SegmentFlags::default();
+        segment
+    }
+
+    fn to_rest_from(path: [f64; 3]) -> Aim {
+        Aim {
+            goal: Goal::Rest { sigma: 1.0 },
+            ratio: f64::INFINITY,
+            kept_rate: 1.0,
+            path,
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
+
+        /// A stop from constant speed on a line takes next to the shortest time, whatever the speed is; its deceleration rises,
+        /// stays and falls, once each.
+        #[test]
+        fn a_stop_on_a_line_takes_next_to_the_shortest_time_and_comes_in_without_chatter(
+            speed_digits in -1.0..2.3f64, stop_s in 0.15..1.0f64, held in 0.0..0.7f64,
+        ) {
+            let speed = 10f64.powf(speed_digits);
+            // Of the stop the share `held` is at the highest deceleration.
+            let ramp_s = stop_s * (1.0 - held) / 2.0;
+            let acceleration = speed / (stop_s - ramp_s);
+            let limits = limits(acceleration, acceleration / ramp_s);
+            let segment = along_x([speed, 0.0, 0.0], 10.0);
+            let (mut governor, mut horizon) =
+                (Governor::new(&limits, 2, PERIOD_S), Horizon::new(&limits, 2, PERIOD_S));
+            let (mut at_s, mut rates) = (0.0, vec![]);
+            while governor.sigma() > 0.0 {
+                let ahead = Ahead::new(&segment, Some(at_s), 0, None);
+                horizon.fill(&ahead, PERIOD_S);
+                let place = ahead.place(TWO_LINEAR);
+                let aim = to_rest_from([speed, 0.0, 0.0]);
+                let chosen = governor.smooth(&aim, &horizon, place, Recent::default());
+                prop_assert!(!chosen.relaxed);
+                at_s += chosen.delta_s;
+                rates.push(governor.rate_per_s());
+                prop_assert!((rates.len() as f64) * PERIOD_S < 1.05 * stop_s + 6.0 * PERIOD_S, "of {stop_s} s");
+            }
+            prop_assert!((rates.len() as f64) * PERIOD_S > 0.99 * stop_s);
+            let most = rates.iter().copied().fold(0.0, f64::min);
+            let eases = |pair: &[f64]| pair[1] > pair[0] - 1e-3 * most;
+            let since = rates.windows(2).position(eases).unwrap_or(rates.len());
+            for pair in rates[since..].windows(2) {
+                prop_assert!(pair[1] >= pair[0] + 1e-2 * most, "it brakes anew: {pair:?} of {most}");
+            }
+        }
+
+        /// Far above a speed that is asked for, the path is braked as hard on a plan that gets faster or slower by itself as on one of
+        /// constant speed: of the jerk that is asked for, the plan's own is a part.
+        #[test]
+        fn the_jerk_of_the_plan_counts_in_what_is_asked_for(
+            sigma in 0.5..1.0f64, rate in -1.0..0.0f64, speed in 50.0..100.0f64,
+            acceleration in -100.0..100.0f64, jerk in -3000.0..3000.0f64,
+        ) {
+            let limits = limits(1000.0, 10_000.0);
+            let mut governor = Governor::new(&limits, 2, PERIOD_S);
+            (governor.sigma, governor.rate_per_s) = (sigma, rate);
+            let driven = |[acceleration, jerk]: [f64; 2]| {
+                let path = [speed, acceleration, jerk];
+                let segment = along_x(path, 0.2);
+                let mut horizon = Horizon::new(&limits, 2, PERIOD_S);
+                horizon.fill(&Ahead::new(&segment, Some(0.0), 0, None), PERIOD_S);
+                let goal = Goal::run(1.0, 0.01 * speed, None);
+                let change = governor.wanted(&Aim { goal, ..to_rest_from(path) }, &horizon);
+                sigma.powi(3) * jerk + 3.0 * sigma * rate * acceleration + speed * change
+            };
+            let (changing, constant) = (driven([acceleration, jerk]), driven([0.0, 0.0]));
+            prop_assert!(constant < -9_000.0, "{constant} mm/s³");
+            prop_assert!((changing - constant).abs() < 1.0, "{changing} mm/s³, {constant} at constant speed");
+        }
+
+        /// Where no way is known jerk may go beyond its limit, but by no more than it must; the end of the period counts as its start does.
+        #[test]
+        fn where_no_way_is_known_jerk_is_looked_at_at_both_ends_of_the_period(
+            from in -0.9..0.9f64, to in -0.9..0.9f64, speed in 10.0..100.0f64, sigma in 0.5..1.0f64,
+        ) {
+            const JERK: f64 = 10_000.0;
+            let limits = limits(1000.0, JERK);
+            let mut segment = along_x([speed, 0.0, from * JERK], 0.1);
+            // Its jerk changes to that of the end within the period.
+            segment.coefficients[0][4] = (to - from) * JERK / (24.0 * sigma * PERIOD_S);
+            let mut governor = Governor::new(&limits, 2, PERIOD_S);
+            governor.sigma = sigma;
+            let mut horizon = Horizon::new(&limits, 2, PERIOD_S);
+            horizon.fill(&Ahead::new(&segment, Some(0.0), 0, None), sigma * PERIOD_S);
+            let mut range = Interval::ALL;
+            governor.jerks(&horizon, &Steps::default(), 0.0, &mut range);
+            for (change, sign) in [(range.low, -1.0), (range.high, 1.0)] {
+                let at = |share: f64| sign * (sigma.powi(3) * share * JERK + speed * change) / JERK;
+                let most = at(from).max(at(to));
+                prop_assert!((0.98..=1.02).contains(&most), "{most} of the jerk for {change}");
+            }
+        }
+    }
+}

@@ -389,6 +389,30 @@ mod tests {
         limits
     }
 
+    /// A way may last as long as the slowest axis takes to stop, and as the work of a period allows.
+    #[test]
+    fn a_way_may_last_as_long_as_the_slowest_stop() {
+        for (acceleration, building_s, stop_s) in [(0.5, 0.05, 0.8), (40.0, 0.1, 1.5)] {
+            let mut limits = limits(acceleration, 0.5, acceleration / building_s);
+            for axis in &mut limits {
+                axis.rapid_mm_per_s = 0.5 * acceleration * stop_s;
+                axis.feed_mm_per_s = 0.1 * axis.rapid_mm_per_s;
+            }
+            let governor = Governor::new(&limits, 2, 1e-3);
+            let horizon = Horizon::new(&limits, 2, 1e-3);
+            let longest_s = 1e-3 * f64::from(governor.most_periods(&horizon));
+            assert!(longest_s > stop_s + building_s, "{longest_s} s of {stop_s}");
+            assert!(
+                longest_s < 1.1 * stop_s + 10.0 * building_s,
+                "{longest_s} s"
+            );
+        }
+        let slow = limits(0.01, 1.0, 1.0);
+        let governor = Governor::new(&slow, 2, 1e-3);
+        let most = governor.most_periods(&Horizon::new(&slow, 2, 1e-3));
+        assert_eq!(f64::from(most), FEED_WAY_PERIODS[1]);
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
 
