@@ -1,5 +1,6 @@
 //! Planning one window: smoothing and retiming take turns.
 
+use tandem_motion::in_wide_instructions;
 use tandem_motion::retime::{Asked, End, Factors, Point, Retimer};
 use tandem_motion::tube::{Lanes, Smoother, Spline, each};
 
@@ -185,33 +186,15 @@ impl<const L: usize> Planning<L> {
         self.marks.last().map_or(0.0, |mark| mark.s)
     }
 
-    /// Plans into `window`; false where what was found does not pass.
-    pub fn plan(
-        &mut self,
-        run: &Run<'_, L>,
-        frame: &Frame<L>,
-        start: &Start<'_, L>,
-        window: &mut Window<L>,
-    ) -> bool {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has what the function is compiled for.
-            return unsafe { self.plan_wide(run, frame, start, window) };
-        }
-        self.plan_any(run, frame, start, window)
-    }
-
-    /// The same in wider instructions; the numbers are the same bit for bit.
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn plan_wide(
-        &mut self,
-        run: &Run<'_, L>,
-        frame: &Frame<L>,
-        start: &Start<'_, L>,
-        window: &mut Window<L>,
-    ) -> bool {
-        self.plan_any(run, frame, start, window)
+    in_wide_instructions! {
+        /// Plans into `window`; false where what was found does not pass.
+        pub fn plan = plan_any, plan_wide(
+            &mut self,
+            run: &Run<'_, L>,
+            frame: &Frame<L>,
+            start: &Start<'_, L>,
+            window: &mut Window<L>,
+        ) -> bool;
     }
 
     #[inline(always)]

@@ -5,6 +5,7 @@
 //! the ends of the travel, are judged by bounds of the polynomials ([`crate::peaks`]). Distances are taken at samples a fine
 //! period apart, with what the motion and the path can do between.
 
+use tandem_motion::in_wide_instructions;
 use tandem_motion::tube::{Lanes, each};
 
 use crate::beside::{
@@ -78,35 +79,16 @@ impl<const L: usize> Default for Checker<L> {
 }
 
 impl<const L: usize> Checker<L> {
-    /// Checks `window`, and notes what it leaves for a stop and what binds its pieces.
-    pub fn check(
-        &mut self,
-        run: &Run<'_, L>,
-        frame: &Frame<L>,
-        counted: &Lanes<L>,
-        start: &Start<'_, L>,
-        (window, travel): (&mut Window<L>, Option<&Travel<L>>),
-    ) -> Checked {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has what the function is compiled for.
-            return unsafe { self.check_wide(run, frame, counted, start, (window, travel)) };
-        }
-        self.check_any(run, frame, counted, start, (window, travel))
-    }
-
-    /// The same in wider instructions; the numbers are the same bit for bit.
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn check_wide(
-        &mut self,
-        run: &Run<'_, L>,
-        frame: &Frame<L>,
-        counted: &Lanes<L>,
-        start: &Start<'_, L>,
-        (window, travel): (&mut Window<L>, Option<&Travel<L>>),
-    ) -> Checked {
-        self.check_any(run, frame, counted, start, (window, travel))
+    in_wide_instructions! {
+        /// Checks `window`, and notes what it leaves for a stop and what binds its pieces.
+        pub fn check = check_any, check_wide(
+            &mut self,
+            run: &Run<'_, L>,
+            frame: &Frame<L>,
+            counted: &Lanes<L>,
+            start: &Start<'_, L>,
+            found: (&mut Window<L>, Option<&Travel<L>>),
+        ) -> Checked;
     }
 
     #[inline(always)]

@@ -1,5 +1,6 @@
 //! Where the motion must pass, and how near.
 
+use tandem_motion::in_wide_instructions;
 use tandem_motion::tube::{Lanes, Waypoint, each};
 
 use crate::frame::{dot, largest, minus};
@@ -271,22 +272,15 @@ impl<const L: usize> Waypoints<L> {
         self.along.push((candidate.s, candidate.chord));
     }
 
-    /// Half widths of the box at a place: all corners of the box stand off the path by no more than the tolerance, and the axes
-    /// that turn get most of it. Along the path the box may be longer.
-    fn half_widths(&self, run: &Run<'_, L>, candidate: &Candidate<L>, grid: Grid) -> Lanes<L> {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has what the function is compiled for.
-            return unsafe { self.half_widths_wide(run, candidate, grid) };
-        }
-        self.half_widths_any(run, candidate, grid)
-    }
-
-    /// The same in wider instructions; the numbers are the same bit for bit.
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn half_widths_wide(&self, run: &Run<'_, L>, candidate: &Candidate<L>, grid: Grid) -> Lanes<L> {
-        self.half_widths_any(run, candidate, grid)
+    in_wide_instructions! {
+        /// Half widths of the box at a place: all corners of the box stand off the path by no more than the tolerance, and the axes
+        /// that turn get most of it. Along the path the box may be longer.
+        fn half_widths = half_widths_any, half_widths_wide(
+            &self,
+            run: &Run<'_, L>,
+            candidate: &Candidate<L>,
+            grid: Grid,
+        ) -> Lanes<L>;
     }
 
     #[inline(always)]

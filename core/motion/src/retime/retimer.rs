@@ -4,6 +4,7 @@ use super::banded::Pentadiagonal;
 use super::share::{Form, Rows, Share, Sides, WIDE, Wide, dot};
 use super::timing::{Rate, weights};
 use super::{End, GRID, PLACES, Point};
+use crate::in_wide_instructions;
 use crate::lanes::{Lanes, each, larger, largest, smaller};
 
 /// A bound on the rate squared where none is stated: sixteen times the speed of the first timing.
@@ -316,25 +317,18 @@ impl<const L: usize, const GROUPS: usize> Retimer<L, GROUPS> {
         self.solve_from(AGAIN, ends, asked)
     }
 
-    fn solve_from(&mut self, start: Start, ends: (End, End), asked: &Asked) -> Status {
-        self.min_rate_squared = asked.min_rate_squared;
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has what the function is compiled for.
-            return unsafe { self.solve_wide(start, ends, asked) };
-        }
-        self.solve_any(start, ends, asked)
-    }
-
-    /// The same in wider instructions; the numbers are the same bit for bit.
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn solve_wide(&mut self, start: Start, ends: (End, End), asked: &Asked) -> Status {
-        self.solve_any(start, ends, asked)
+    in_wide_instructions! {
+        fn solve_from = solve_any, solve_wide(
+            &mut self,
+            start: Start,
+            ends: (End, End),
+            asked: &Asked,
+        ) -> Status;
     }
 
     #[inline(always)]
     fn solve_any(&mut self, start: Start, ends: (End, End), asked: &Asked) -> Status {
+        self.min_rate_squared = asked.min_rate_squared;
         self.name_unknowns(ends);
         self.fill_up();
         self.start(start);

@@ -2,6 +2,7 @@
 
 use super::banded::{self, Row};
 use super::spline::{Spline, weights};
+use crate::in_wide_instructions;
 use crate::lanes::{Lanes, each, larger, largest, smaller};
 
 /// Iterations at most.
@@ -88,32 +89,15 @@ fn combine<const L: usize>(w: &[f64; 4], c: &[Lanes<L>; 4]) -> Lanes<L> {
 }
 
 impl<const L: usize> Smoother<L> {
-    /// Moves the control points of `spline`, but for the first and the last three, to where the jerk is least:
-    /// `Σ 0.05·r² + ½·max(0, |r| − 0.7)²` with r the jerk of each interval in units of `jerk_mm_per_s3`. Rough loop.
-    pub fn smooth(
-        &mut self,
-        spline: &mut Spline<L>,
-        waypoints: &[Waypoint<L>],
-        jerk_mm_per_s3: &Lanes<L>,
-    ) -> SmoothStatus {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has what the function is compiled for.
-            return unsafe { self.smooth_wide(spline, waypoints, jerk_mm_per_s3) };
-        }
-        self.smooth_any(spline, waypoints, jerk_mm_per_s3)
-    }
-
-    /// The same in wider instructions; the numbers are the same bit for bit.
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn smooth_wide(
-        &mut self,
-        spline: &mut Spline<L>,
-        waypoints: &[Waypoint<L>],
-        jerk_mm_per_s3: &Lanes<L>,
-    ) -> SmoothStatus {
-        self.smooth_any(spline, waypoints, jerk_mm_per_s3)
+    in_wide_instructions! {
+        /// Moves the control points of `spline`, but for the first and the last three, to where the jerk is least:
+        /// `Σ 0.05·r² + ½·max(0, |r| − 0.7)²` with r the jerk of each interval in units of `jerk_mm_per_s3`. Rough loop.
+        pub fn smooth = smooth_any, smooth_wide(
+            &mut self,
+            spline: &mut Spline<L>,
+            waypoints: &[Waypoint<L>],
+            jerk_mm_per_s3: &Lanes<L>,
+        ) -> SmoothStatus;
     }
 
     #[inline(always)]
