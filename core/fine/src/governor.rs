@@ -104,7 +104,7 @@ pub mod tuning;
 mod way_below;
 
 use feeds_ahead::FeedsAhead;
-use keep_limits::Recovery;
+use keep_limits::WaySearch;
 pub use rest_at::RestAt;
 
 use tandem_sdk::{AxisLimits, MAX_AXES};
@@ -199,34 +199,23 @@ pub struct Governor {
     period_s: f64,
     acceleration: [f64; MAX_AXES],
     axes: usize,
-    /// The longest time in which an axis stops from its highest speed with its acceleration, s: for as long the rate may have to
-    /// be lowered.
-    stop_s: f64,
     /// Where jerk is not limited: the rates from which the feeds ahead can be met.
     feeds_ahead: FeedsAhead,
-    /// Where jerk is limited: the recovery that was found last, and one that is being tried.
-    recovery: Recovery,
-    tried: Recovery,
-    /// Steps on ways below a feed that may still be tried in this period.
-    steps_left: u32,
+    /// Where jerk is limited: the way on.
+    ways: WaySearch,
 }
 
 impl Governor {
     /// A governor at σ = 1: where nothing moves, program time passes at its own rate. Host; allocates.
     pub fn new(limits: &[AxisLimits; MAX_AXES], axes: usize, period_s: f64) -> Self {
-        let stop_s =
-            |l: &AxisLimits| l.feed_mm_per_s.max(l.rapid_mm_per_s) / l.acceleration_mm_per_s2;
         Self {
             sigma: 1.0,
             rate_per_s: 0.0,
             period_s,
             acceleration: limits.map(|l| l.acceleration_mm_per_s2),
             axes,
-            stop_s: limits[..axes].iter().map(stop_s).fold(0.0, f64::max),
             feeds_ahead: FeedsAhead::new(PeriodPoints::new(limits, axes)),
-            recovery: Recovery::new(),
-            tried: Recovery::new(),
-            steps_left: 0,
+            ways: WaySearch::new(period_s),
         }
     }
 
@@ -243,13 +232,13 @@ impl Governor {
     /// Sets the rate where nothing moves and any rate is as good.
     pub fn jump(&mut self, sigma: f64) {
         (self.sigma, self.rate_per_s) = (sigma, 0.0);
-        self.recovery.clear();
+        self.ways.found.clear();
     }
 
     /// Forgets the way that was found last: the rate has stayed as it is since, and the way was for another place of the plan.
     #[inline]
     pub fn forget_way(&mut self) {
-        self.recovery.clear();
+        self.ways.found.clear();
     }
 
     /// The highest rate at which the plan itself keeps the limits: 1 unless the planner is defective.

@@ -31,6 +31,9 @@ pub struct Horizon {
     is_hurried: bool,
     /// How far the grid reaches, s of program time.
     pub reach_s: f64,
+    /// The longest time in which an axis stops from its highest speed with its acceleration, s: for as long the rate may have to
+    /// be lowered.
+    pub stop_s: f64,
     /// Least path jerk that the limits leave on a straight path, over the points, mm/s³.
     pub path_jerk_mm_per_s3: f64,
     /// Bound on σ̈ that the period sets: σ changes in small steps, also where next to nothing moves, 1/s².
@@ -51,6 +54,8 @@ impl Horizon {
     /// No points. The horizon is the longest time in which an axis changes its acceleration from none to its limit.
     pub fn new(limits: &[AxisLimits; MAX_AXES], axes: usize, period_s: f64) -> Self {
         let change_s = |l: &AxisLimits| l.acceleration_mm_per_s2 / l.jerk_mm_per_s3;
+        let stop_s =
+            |l: &AxisLimits| l.feed_mm_per_s.max(l.rapid_mm_per_s) / l.acceleration_mm_per_s2;
         Self {
             list: vec![HorizonPoint::default(); Self::POINTS].into_boxed_slice(),
             count: 0,
@@ -59,6 +64,7 @@ impl Horizon {
             acceleration: limits.map(|l| l.acceleration_mm_per_s2),
             jerk: limits.map(|l| l.jerk_mm_per_s3),
             reach_s: limits[..axes].iter().map(change_s).fold(0.0, f64::max),
+            stop_s: limits[..axes].iter().map(stop_s).fold(0.0, f64::max),
             max_change_per_s2: MAX_RATE_CHANGE / (period_s * period_s),
             path_jerk_mm_per_s3: f64::INFINITY,
             rate_change_per_s2: f64::INFINITY,

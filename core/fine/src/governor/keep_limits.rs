@@ -4,8 +4,10 @@
 //! A constant σ is admissible wherever the plan is. So σ̈ of a period is good if from its end on σ̇ can be brought to zero
 //! within the limits and within 0 ≤ σ ≤ 1, tried out period by period on the plan ahead. The way that was found is kept:
 //! where the next period finds no better one, it follows that way to its end.
+//!
+//! [`WaySearch`] is that search, for all that asks for a way: `order3.rs` asks it what may be taken of the σ̈ that is wanted, and
+//! `way_below.rs` has it try ways that keep a feed as well. What is wanted it does not know.
 
-use super::Governor;
 use super::interval::{Interval, RateAt};
 use super::tuning::{
     ACCELERATION_SHARE, FEED_WAY_LIMIT_SHARE, FEED_WAY_PERIODS, JERK_SHARE, RECOVERY_PERIODS,
@@ -19,6 +21,8 @@ use crate::steps::{AROUND, Recent, Steps};
 const NONE_S: f64 = 1e-9;
 /// Tries between the σ̈ wanted and the one that makes σ constant.
 const HALVINGS: u32 = 4;
+/// Share of what the limits leave of σ̈ by which a way that was tried out differs from it by rounding.
+const ROUNDED_SHARE: f64 = 1e-3;
 
 /// σ̈ of the periods of a way at whose end σ is constant, 1/s².
 #[derive(Debug)]
@@ -98,9 +102,35 @@ impl RateState<'_> {
     }
 }
 
-impl Governor {
+/// The search for a way: of which σ̈ the period leaves one, as near as may be to the σ̈ that is wanted. Whether it has to keep the
+/// limits ([`WaySearch::recoverable`]) or a feed as well ([`Below::recoverable`](super::way_below::Below::recoverable)), it is sought
+/// in the same manner, and what the limits leave in each period of it is [`WaySearch::range`].
+#[derive(Debug)]
+pub(super) struct WaySearch {
+    pub period_s: f64,
+    /// The way that was found last, which is followed where no better one is found.
+    pub found: Recovery,
+    /// One that is being tried.
+    pub tried: Recovery,
+}
+
+impl WaySearch {
+    /// No way is known. Allocates.
+    pub(super) fn new(period_s: f64) -> Self {
+        Self {
+            period_s,
+            found: Recovery::new(),
+            tried: Recovery::new(),
+        }
+    }
+
+    /// Keeps the way that has been tried.
+    pub(super) fn keep_tried(&mut self) {
+        std::mem::swap(&mut self.found, &mut self.tried);
+    }
+
     /// The σ̈ nearest to `wanted` from which σ can be made constant within the limits, with the way that does it in
-    /// `self.recovery`; `None` where none is found.
+    /// [`WaySearch::found`]; `None` where none is found.
     pub(super) fn recoverable(
         &mut self,
         wanted: f64,
@@ -108,34 +138,20 @@ impl Governor {
         horizon: &Horizon,
     ) -> Option<f64> {
         let h = self.period_s;
-        let range = self.range(&here, self.period_s, horizon)?;
-        let mut tries = |change: f64| {
+        let range = self.range(&here, h, horizon)?;
+        let steady = range.nearest(-here.rate_per_s / h);
+        nearest_with_way(range.nearest(wanted), steady, HALVINGS, |change| {
             let mut way = here;
             way.pass(change, h);
             let found = self.recovers(way, horizon);
             if found {
-                std::mem::swap(&mut self.recovery, &mut self.tried);
+                self.keep_tried();
             }
             found
-        };
-        let wanted = range.nearest(wanted);
-        if tries(wanted) {
-            return Some(wanted);
-        }
-        let (mut good, mut bad) = (range.nearest(-here.rate_per_s / h), wanted);
-        let mut found = None;
-        for _ in 0..HALVINGS {
-            let between = f64::midpoint(good, bad);
-            if tries(between) {
-                (good, found) = (between, Some(between));
-            } else {
-                bad = between;
-            }
-        }
-        found
+        })
     }
 
-    /// Whether σ becomes constant; the way that does it is noted in `self.tried`.
+    /// Whether σ becomes constant; the way that does it is noted in [`WaySearch::tried`].
     fn recovers(&mut self, mut way: RateState<'_>, horizon: &Horizon) -> bool {
         let h = self.period_s;
         let [least, most] = RECOVERY_PERIODS;
@@ -164,6 +180,18 @@ impl Governor {
             }
         }
         false
+    }
+
+    /// Whether the next period of the way that was found last keeps the limits: where it was tried out some periods at a time, it
+    /// may go beyond them.
+    pub(super) fn keeps_limits_on(&self, here: &RateState<'_>, horizon: &Horizon) -> bool {
+        let range = self.range(here, self.period_s, horizon);
+        range.is_some_and(|range| {
+            let next = self.found.peek();
+            next.is_none_or(|next| {
+                (range.nearest(next) - next).abs() <= ROUNDED_SHARE * (range.high - range.low)
+            })
+        })
     }
 
     /// σ̈ that the limits allow in the `h` seconds that begin here: a period, or some of them.
@@ -249,6 +277,29 @@ impl Governor {
     }
 }
 
+/// The σ̈ nearest to `wanted` that `leaves_way`, by halvings of what lies between it and `good`, which is taken to leave one; `None`
+/// where none of those that were tried does.
+pub(super) fn nearest_with_way(
+    wanted: f64,
+    mut good: f64,
+    halvings: u32,
+    mut leaves_way: impl FnMut(f64) -> bool,
+) -> Option<f64> {
+    if leaves_way(wanted) {
+        return Some(wanted);
+    }
+    let (mut bad, mut found) = (wanted, None);
+    for _ in 0..halvings {
+        let between = f64::midpoint(good, bad);
+        if leaves_way(between) {
+            (good, found) = (between, Some(between));
+        } else {
+            bad = between;
+        }
+    }
+    found
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -314,8 +365,8 @@ mod tests {
                 recent: Recent::default(),
             };
             let limits = limits();
-            let governor = Governor::new(&limits, 2, PERIOD_S);
-            let Some(range) = governor.range(&way, PERIOD_S, &Horizon::new(&limits, 2, PERIOD_S)) else {
+            let ways = WaySearch::new(PERIOD_S);
+            let Some(range) = ways.range(&way, PERIOD_S, &Horizon::new(&limits, 2, PERIOD_S)) else {
                 return Ok(());
             };
             for change in [range.low, range.high] {

@@ -76,7 +76,7 @@ impl Governor {
         let is_constant = wanted == 0.0 && self.rate_per_s == 0.0;
         let below = below.filter(|below| !is_constant || self.sigma > below.kept_rate);
         if is_constant && below.is_none() {
-            self.recovery.clear();
+            self.ways.found.clear();
             return Chosen {
                 delta_s: self.sigma * self.period_s,
                 relaxed: false,
@@ -85,47 +85,50 @@ impl Governor {
         let mut change = None;
         if let Some(below) = below {
             if is_constant && here.place.begin_behind_rest() {
-                self.begin_kept(here, below, horizon);
+                match below.rate_to_begin_with(here, &mut self.ways, horizon) {
+                    Some(sigma) => self.sigma = sigma,
+                    None => self.jump(below.kept_rate),
+                }
                 return Chosen {
                     delta_s: self.sigma * self.period_s,
                     relaxed: false,
                 };
             }
-            change = self.recoverable_below(wanted, here, below, horizon);
-            if change.is_none() && goal.is_rest() && self.recovery.keeps_feed {
-                self.recovery.keeps_feed = false;
-                wanted = wanted.min(self.recovery.peek().unwrap_or(wanted));
+            change = below.recoverable(wanted, here, &mut self.ways, horizon);
+            if change.is_none() && goal.is_rest() && self.ways.found.keeps_feed {
+                self.ways.found.keeps_feed = false;
+                wanted = wanted.min(self.ways.found.peek().unwrap_or(wanted));
             }
         } else {
-            self.recovery.keeps_feed = false;
+            self.ways.found.keeps_feed = false;
         }
-        if change.is_none() && !self.recovery.keeps_feed {
-            change = self.recoverable(wanted, here, horizon);
-        } else if change.is_none() && !self.keeps_limits_on(&here, horizon) {
+        if change.is_none() && !self.ways.found.keeps_feed {
+            change = self.ways.recoverable(wanted, here, horizon);
+        } else if change.is_none() && !self.ways.keeps_limits_on(&here, horizon) {
             // The limits come before the feed.
-            self.recovery.keeps_feed = false;
-            let wanted = self.recovery.peek().unwrap_or(wanted);
-            change = self.recoverable(wanted, here, horizon);
+            self.ways.found.keeps_feed = false;
+            let wanted = self.ways.found.peek().unwrap_or(wanted);
+            change = self.ways.recoverable(wanted, here, horizon);
         }
         match change {
             Some(change) => Chosen {
                 delta_s: self.pass(change),
                 relaxed: false,
             },
-            None => self.go_on(horizon, &self.reserve(&here)),
+            None => self.go_on(horizon, &self.ways.reserve(&here)),
         }
     }
 
     /// Follows the way that was found last, at whose end σ is constant.
     fn go_on(&mut self, horizon: &Horizon, reserve: &Steps) -> Chosen {
-        if self.rate_per_s == 0.0 && !self.recovery.keeps_feed {
+        if self.rate_per_s == 0.0 && !self.ways.found.keeps_feed {
             return Chosen {
                 delta_s: self.pass(0.0),
                 relaxed: false,
             };
         }
-        let Some((change, last)) = self.recovery.next() else {
-            self.recovery.keeps_feed = false;
+        let Some((change, last)) = self.ways.found.next() else {
+            self.ways.found.keeps_feed = false;
             return if self.rate_per_s == 0.0 {
                 Chosen {
                     delta_s: self.pass(0.0),

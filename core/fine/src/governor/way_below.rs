@@ -7,13 +7,13 @@
 //! axis which turns leaves nothing to lower σ with just before the plan is too fast: a rate from which it would have to be
 //! lowered there is never reached. The way that was found is kept, and is gone where the next period finds no better one.
 
+use super::Aim;
 use super::interval::Interval;
-use super::keep_limits::RateState;
+use super::keep_limits::{RateState, WaySearch, nearest_with_way};
 use super::tuning::{
     FEED_POINT_MIN_RATE, FEED_POINT_SPACING, FEED_WAY_PERIODS, FEED_WAY_RAMPS,
     FEED_WAY_SINGLE_PERIODS, FEED_WAY_STEPS, MAX_LOWERING,
 };
-use super::{Aim, Governor};
 use crate::horizon::Horizon;
 use crate::plan_ahead::{Pace, PlanCursor};
 
@@ -27,8 +27,6 @@ const BEGINNINGS: u32 = 5;
 const LOOKS: u32 = 4;
 /// Share of the rate at which the plan keeps the feed everywhere that a way is aimed at: it ends between the two.
 const LANDING_SHARE: f64 = 0.9;
-/// Share of what the limits leave of σ̈ by which a way that was tried out differs from it by rounding.
-const ROUNDED_SHARE: f64 = 1e-3;
 /// Relative tolerance on the feed.
 const TOLERANCE: f64 = 1e-7;
 
@@ -45,6 +43,8 @@ pub(super) struct Below<'a> {
     place: PlanCursor<'a>,
     /// Program time from the last one seen to the next, s.
     step_s: f64,
+    /// Steps on ways that may still be tried in this period.
+    steps_left: u32,
 }
 
 impl<'a> Below<'a> {
@@ -59,6 +59,7 @@ impl<'a> Below<'a> {
             seen: 0,
             place,
             step_s: period_s * here.sigma.max(FEED_POINT_MIN_RATE),
+            steps_left: 0,
         }
     }
 
@@ -152,122 +153,84 @@ impl Watch {
     }
 }
 
-impl Governor {
-    /// The σ̈ nearest to `wanted` from which there is a way below the feed, with that way in `self.recovery`; `None` where none
+impl Below<'_> {
+    /// The σ̈ nearest to `wanted` from which there is a way below the feed, with that way in [`WaySearch::found`]; `None` where none
     /// is found.
-    pub(super) fn recoverable_below(
+    pub(super) fn recoverable(
         &mut self,
         wanted: f64,
         here: RateState<'_>,
-        below: &mut Below<'_>,
+        ways: &mut WaySearch,
         horizon: &Horizon,
     ) -> Option<f64> {
-        let h = self.period_s;
+        let h = ways.period_s;
         self.steps_left = FEED_WAY_STEPS;
-        let range = self.range(&here, h, horizon)?;
-        let wanted = range.nearest(wanted);
-        if self.leaves_way_below(wanted, here, below, horizon) {
-            return Some(wanted);
-        }
-        let kept = self.recovery.peek().filter(|_| self.recovery.keeps_feed);
-        let (mut good, mut bad) = (
-            kept.unwrap_or(range.nearest(-MAX_LOWERING / (h * h))),
-            wanted,
-        );
-        let mut found = None;
-        for _ in 0..HALVINGS {
-            let between = f64::midpoint(good, bad);
-            if self.leaves_way_below(between, here, below, horizon) {
-                (good, found) = (between, Some(between));
-            } else {
-                bad = between;
-            }
-        }
-        found
-    }
-
-    /// Begins from rest, where any rate is as good, with one from which there is a way below the feed: the rate so far, or one
-    /// that is nearer to the one at which the plan keeps it everywhere.
-    pub(super) fn begin_kept(
-        &mut self,
-        mut here: RateState<'_>,
-        below: &mut Below<'_>,
-        horizon: &Horizon,
-    ) {
-        let above = self.sigma - below.kept_rate;
-        self.steps_left = BEGINNINGS * FEED_WAY_STEPS;
-        for halvings in 0..BEGINNINGS {
-            here.sigma = below.kept_rate + above / f64::from(1_u32 << halvings);
-            if self.leaves_way_below(0.0, here, below, horizon) {
-                self.sigma = here.sigma;
-                return;
-            }
-        }
-        self.jump(below.kept_rate);
-    }
-
-    /// Whether the next period of the way that was found last keeps the limits: where it was tried out some periods at a time, it
-    /// may go beyond them.
-    pub(super) fn keeps_limits_on(&self, here: &RateState<'_>, horizon: &Horizon) -> bool {
-        let range = self.range(here, self.period_s, horizon);
-        range.is_some_and(|range| {
-            let next = self.recovery.peek();
-            next.is_none_or(|next| {
-                (range.nearest(next) - next).abs() <= ROUNDED_SHARE * (range.high - range.low)
-            })
+        let range = ways.range(&here, h, horizon)?;
+        let kept = ways.found.peek().filter(|_| ways.found.keeps_feed);
+        let good = kept.unwrap_or(range.nearest(-MAX_LOWERING / (h * h)));
+        nearest_with_way(range.nearest(wanted), good, HALVINGS, |change| {
+            self.leaves_way(change, here, ways, horizon)
         })
     }
 
-    /// Whether after a period with σ̈ of `change` there is a way below the feed; it is noted in `self.recovery`.
-    fn leaves_way_below(
+    /// From rest, where any rate is as good: one from which there is a way below the feed, the rate so far or one that is nearer to
+    /// the one at which the plan keeps it everywhere. `None` where that one is left.
+    pub(super) fn rate_to_begin_with(
+        &mut self,
+        mut here: RateState<'_>,
+        ways: &mut WaySearch,
+        horizon: &Horizon,
+    ) -> Option<f64> {
+        let above = here.sigma - self.kept_rate;
+        self.steps_left = BEGINNINGS * FEED_WAY_STEPS;
+        (0..BEGINNINGS).find_map(|halvings| {
+            here.sigma = self.kept_rate + above / f64::from(1_u32 << halvings);
+            self.leaves_way(0.0, here, ways, horizon)
+                .then_some(here.sigma)
+        })
+    }
+
+    /// Whether after a period with σ̈ of `change` there is a way below the feed; it is noted in [`WaySearch::found`].
+    fn leaves_way(
         &mut self,
         change: f64,
         here: RateState<'_>,
-        below: &mut Below<'_>,
+        ways: &mut WaySearch,
         horizon: &Horizon,
     ) -> bool {
-        let mut watch = Watch::new(&here, below.ratio);
+        let h = ways.period_s;
+        let mut watch = Watch::new(&here, self.ratio);
         let mut way = here;
-        way.pass(change, self.period_s);
-        let found = !turns_beyond(&here, change, self.period_s)
-            && watch.is_kept(&way, below.ratio, self.period_s)
-            && (self.becomes_constant((way, watch), below, horizon)
-                || self.becomes_slow(way, watch, below, horizon));
+        way.pass(change, h);
+        let found = !turns_beyond(&here, change, h)
+            && watch.is_kept(&way, self.ratio, h)
+            && (self.becomes_constant((way, watch), ways, horizon)
+                || self.becomes_slow((way, watch), ways, horizon));
         if found {
-            std::mem::swap(&mut self.recovery, &mut self.tried);
-            self.recovery.keeps_feed = true;
+            ways.keep_tried();
+            ways.found.keeps_feed = true;
         }
         found
-    }
-
-    /// Most periods of a way.
-    fn most_periods(&self, horizon: &Horizon) -> u32 {
-        let [least, most] = FEED_WAY_PERIODS;
-        let longest_s = FEED_WAY_RAMPS * horizon.reach_s + self.stop_s;
-        (longest_s / self.period_s).clamp(least, most) as u32
     }
 
     /// Whether σ becomes constant, soonest, at a rate at which no place ahead is too fast.
     fn becomes_constant(
         &mut self,
         (mut way, mut watch): (RateState<'_>, Watch),
-        below: &mut Below<'_>,
+        ways: &mut WaySearch,
         horizon: &Horizon,
     ) -> bool {
-        self.tried.clear();
-        let (mut passed, most) = (0, self.most_periods(horizon));
+        ways.tried.clear();
+        let (mut passed, most) = (0, most_periods(ways.period_s, horizon));
         while passed < most && (0.0..=1.0).contains(&way.sigma) {
             if way.rate_per_s == 0.0 {
-                return below.is_kept_at(way.sigma);
+                return self.is_kept_at(way.sigma);
             }
             let periods = periods_of_step(passed);
-            let step_s = f64::from(periods) * self.period_s;
+            let step_s = f64::from(periods) * ways.period_s;
             let steady = -way.rate_per_s / step_s;
             let mut on = (&mut way, &mut watch);
-            if self
-                .go(&mut on, steady, (periods, below.ratio), horizon)
-                .is_none()
-            {
+            if self.go(&mut on, steady, periods, (ways, horizon)).is_none() {
                 return false;
             }
             passed += periods;
@@ -278,34 +241,33 @@ impl Governor {
     /// Whether σ becomes constant at the rate at which the plan keeps the feed everywhere, lowered as far as the limits allow.
     fn becomes_slow(
         &mut self,
-        mut way: RateState<'_>,
-        mut watch: Watch,
-        below: &mut Below<'_>,
+        (mut way, mut watch): (RateState<'_>, Watch),
+        ways: &mut WaySearch,
         horizon: &Horizon,
     ) -> bool {
-        self.tried.clear();
-        let (mut passed, most) = (0, self.most_periods(horizon));
+        ways.tried.clear();
+        let (mut passed, most) = (0, most_periods(ways.period_s, horizon));
         let mut raisable = f64::INFINITY;
         while passed < most && (0.0..=1.0).contains(&way.sigma) {
             let (sigma, rate) = (way.sigma, way.rate_per_s);
             // While σ̇ is brought to nothing.
             let falling = rate * rate / (2.0 * raisable).max(f64::MIN_POSITIVE);
-            let is_enough = rate <= 0.0 && sigma - falling <= below.kept_rate;
+            let is_enough = rate <= 0.0 && sigma - falling <= self.kept_rate;
             if rate == 0.0 && is_enough {
                 return true;
             }
             let periods = periods_of_step(passed);
-            let step_s = f64::from(periods) * self.period_s;
+            let step_s = f64::from(periods) * ways.period_s;
             let steady = -rate / step_s;
             let wanted = if is_enough {
                 steady
             } else {
                 // As low as leaves another such step to bring σ̇ to nothing.
-                let landing = LANDING_SHARE * below.kept_rate - sigma - 1.5 * step_s * rate;
+                let landing = LANDING_SHARE * self.kept_rate - sigma - 1.5 * step_s * rate;
                 (landing.max(-MAX_LOWERING) / (step_s * step_s)).min(steady)
             };
             let mut on = (&mut way, &mut watch);
-            let Some(range) = self.go(&mut on, wanted, (periods, below.ratio), horizon) else {
+            let Some(range) = self.go(&mut on, wanted, periods, (ways, horizon)) else {
                 return false;
             };
             raisable = range.high.max(0.0);
@@ -320,12 +282,12 @@ impl Governor {
         &mut self,
         (way, watch): &mut (&mut RateState<'_>, &mut Watch),
         wanted: f64,
-        (periods, ratio): (u32, f64),
-        horizon: &Horizon,
+        periods: u32,
+        (ways, horizon): (&mut WaySearch, &Horizon),
     ) -> Option<Interval> {
-        let step_s = f64::from(periods) * self.period_s;
+        let step_s = f64::from(periods) * ways.period_s;
         self.steps_left = self.steps_left.checked_sub(1)?;
-        let range = self
+        let range = ways
             .range(way, step_s, horizon)
             .filter(|_| way.place.is_known())?;
         let change = range.nearest(wanted);
@@ -333,14 +295,14 @@ impl Governor {
             return None;
         }
         for _ in 0..periods {
-            self.tried.push(change);
+            ways.tried.push(change);
         }
         let is_steady = change == -way.rate_per_s / step_s;
         let looks = periods.min(LOOKS);
         for _ in 0..looks {
             let look_s = step_s / f64::from(looks);
             way.pass(change, look_s);
-            if !watch.is_kept(way, ratio, look_s) {
+            if !watch.is_kept(way, self.ratio, look_s) {
                 return None;
             }
         }
@@ -358,6 +320,13 @@ fn turns_beyond(from: &RateState<'_>, change: f64, step_s: f64) -> bool {
     turns && !(0.0..=1.0).contains(&(from.sigma - rate * rate / (2.0 * change)))
 }
 
+/// Most periods of a way.
+fn most_periods(period_s: f64, horizon: &Horizon) -> u32 {
+    let [least, most] = FEED_WAY_PERIODS;
+    let longest_s = FEED_WAY_RAMPS * horizon.reach_s + horizon.stop_s;
+    (longest_s / period_s).clamp(least, most) as u32
+}
+
 /// How many periods the next step of a way lasts behind so many.
 fn periods_of_step(passed: u32) -> u32 {
     (passed / FEED_WAY_SINGLE_PERIODS).max(1)
@@ -365,7 +334,7 @@ fn periods_of_step(passed: u32) -> u32 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Goal;
+    use super::super::{Goal, Governor};
     use super::*;
     use crate::plan_ahead::{Ahead, TWO_LINEAR};
     use crate::steps::Recent;
@@ -398,9 +367,8 @@ mod tests {
                 axis.rapid_mm_per_s = 0.5 * acceleration * stop_s;
                 axis.feed_mm_per_s = 0.1 * axis.rapid_mm_per_s;
             }
-            let governor = Governor::new(&limits, 2, 1e-3);
             let horizon = Horizon::new(&limits, 2, 1e-3);
-            let longest_s = 1e-3 * f64::from(governor.most_periods(&horizon));
+            let longest_s = 1e-3 * f64::from(most_periods(1e-3, &horizon));
             assert!(longest_s > stop_s + building_s, "{longest_s} s of {stop_s}");
             assert!(
                 longest_s < 1.1 * stop_s + 10.0 * building_s,
@@ -408,8 +376,7 @@ mod tests {
             );
         }
         let slow = limits(0.01, 1.0, 1.0);
-        let governor = Governor::new(&slow, 2, 1e-3);
-        let most = governor.most_periods(&Horizon::new(&slow, 2, 1e-3));
+        let most = most_periods(1e-3, &Horizon::new(&slow, 2, 1e-3));
         assert_eq!(f64::from(most), FEED_WAY_PERIODS[1]);
     }
 
