@@ -21,7 +21,6 @@ mod ratio;
 mod release;
 mod report;
 mod roles;
-mod single_block;
 mod spindle;
 mod stops;
 

@@ -6,20 +6,34 @@
 
 use tandem_sdk::{Segment, SegmentFlags};
 
-use super::govern::{PlanFollower, Ratios, within};
+use super::govern::{Ratios, within};
+use crate::governor::Governor;
 use crate::governor::tuning::ABOVE_FEED_SHARE;
+use crate::period_points::PeriodPoints;
+use crate::plan_ahead::Ahead;
 
 /// Rounds in which the rate at the end of a piece is sought; an odd number, so that the last one is not too high.
 const PIECE_ROUNDS: usize = 3;
 
-/// How far a period has been laid out.
+/// What a period is not to exceed.
 #[derive(Clone, Copy, Debug)]
-struct Laid {
-    sigma: f64,
+pub(super) struct Bounds<'a> {
+    pub(super) ratios: &'a Ratios,
+    /// For places ahead, mm/s.
+    pub(super) way_speed_mm_per_s: f64,
+    /// The highest rate.
+    pub(super) limit: f64,
+}
+
+/// A period that is laid out segment by segment, as far as that has come.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Laid {
+    /// Rate at the end.
+    pub(super) sigma: f64,
     /// Time of the period that is left, s.
     left_s: f64,
     /// Program time that has passed, s.
-    passed_s: f64,
+    pub(super) passed_s: f64,
 }
 
 impl Laid {
@@ -39,45 +53,31 @@ impl Laid {
         self.passed_s += f64::midpoint(self.sigma, end) * self.left_s;
         (self.sigma, self.left_s) = (end, 0.0);
     }
-}
 
-impl PlanFollower {
-    /// Lays the period out segment by segment, at no rate above `limit`; takes the rate at its end and gives the program time
-    /// that passes, s.
-    pub(super) fn govern_in_pieces(
-        &mut self,
-        ratios: &Ratios,
-        way_speed_mm_per_s: f64,
-        limit: f64,
-    ) -> f64 {
-        let Self {
-            cursor,
-            points,
-            governor,
-            ..
-        } = self;
+    /// Lays a period of `period_s` out on the plan ahead, from the rate of `governor`, which is not changed. `points` are taken for one
+    /// piece after the other.
+    pub(super) fn out(
+        ahead: &Ahead<'_>,
+        governor: &Governor,
+        points: &mut PeriodPoints,
+        period_s: f64,
+        bounds: &Bounds<'_>,
+    ) -> Self {
         let covered_s = points.covered_s;
-        let mut laid = Laid {
+        let mut laid = Self {
             sigma: governor.sigma(),
-            left_s: self.period_s,
+            left_s: period_s,
             passed_s: 0.0,
         };
-        for piece in cursor.ahead().pieces() {
+        for piece in ahead.pieces() {
             let (segment, from_s) = (piece.segment, piece.from_s);
             let whole_s = piece.duration_s();
             let piece_s = whole_s.min(laid.sigma * laid.left_s);
             if piece_s > 0.0 {
                 let target_to = |piece_s: f64| {
-                    piece_target(
-                        segment,
-                        from_s,
-                        piece_s,
-                        laid.sigma,
-                        ratios,
-                        way_speed_mm_per_s,
-                    )
-                    .min(governor.rate_in_time(laid.passed_s + piece_s))
-                    .min(limit)
+                    piece_target(segment, from_s, piece_s, laid.sigma, bounds)
+                        .min(governor.rate_in_time(laid.passed_s + piece_s))
+                        .min(bounds.limit)
                 };
                 let mut target = target_to(piece_s);
                 // The higher the rate becomes the farther the piece goes, where the plan may be faster: rounds find it from both
@@ -104,8 +104,7 @@ impl PlanFollower {
             }
         }
         points.covered_s = covered_s;
-        governor.take(laid.sigma);
-        laid.passed_s
+        laid
     }
 }
 
@@ -115,15 +114,15 @@ fn piece_target(
     from_s: f64,
     piece_s: f64,
     sigma: f64,
-    ratios: &Ratios,
-    places: f64,
+    bounds: &Bounds<'_>,
 ) -> f64 {
+    let ratios = bounds.ratios;
     let to_s = from_s + piece_s;
     let (before, behind) = (
         segment.path_speed_mm_per_s(from_s),
         segment.path_speed_mm_per_s(to_s),
     );
-    let of_places = within(places, behind);
+    let of_places = within(bounds.way_speed_mm_per_s, behind);
     if segment.flags.contains(SegmentFlags::RAPID) {
         return ratios.rapid.min(of_places);
     }
