@@ -4,7 +4,6 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Instant;
 
-use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use super::clerk::Clerk;
@@ -13,7 +12,7 @@ use super::request::{Asked, read};
 use super::words::word_of;
 use crate::grbl::{Sender, Settings};
 use crate::operator::{
-    Answer, House, Lease, MAX_OWNERS, News, Problem, Rhythm, Role, Talk, Tokens,
+    Answer, House, Lease, Look, MAX_OWNERS, News, Problem, Rhythm, Role, Talk, Tokens,
 };
 
 /// The protocol's number, in the greeting.
@@ -316,7 +315,7 @@ impl Protocol2 {
             return Err(format!("the status has no field \"{none}\""));
         }
         self.subscription = (rate_hz != 0.0).then(|| Subscription {
-            rhythm: Rhythm::new(rate_hz, self.client, now),
+            rhythm: Rhythm::new(rate_hz, now),
             fields,
             changes: asked.is_on("changes"),
             before: Map::new(),
@@ -449,10 +448,13 @@ impl Talk for Protocol2 {
             .min()
     }
 
-    fn telemetry(&mut self, lost: u64) -> String {
+    fn telemetry(&mut self, lost: u64, look: &mut Look) -> String {
         match &mut self.subscription {
-            Some(of) if of.picks() => status_line(lost, &of.pick(self.desk.status())),
-            _ => status_line(lost, &self.desk.shown()),
+            Some(of) if of.picks() => {
+                let picked = of.pick(self.desk.status());
+                status_line(lost, &picked.to_string())
+            }
+            _ => status_line(lost, look.text(|| self.desk.shown())),
         }
     }
 
@@ -482,20 +484,8 @@ fn check(asked: &Asked) -> Result<(), String> {
 }
 
 /// A status line that was subscribed to, behind so many that were lost.
-fn status_line(lost: u64, status: &impl Serialize) -> String {
-    #[derive(Serialize)]
-    struct Line<'a, S> {
-        event: &'static str,
-        lost: u64,
-        status: &'a S,
-    }
-    let line = Line {
-        event: "status",
-        lost,
-        status,
-    };
-    // What is told has neither a map with other keys than words nor anything else that is no JSON.
-    serde_json::to_string(&line).unwrap_or_default() + "\n"
+fn status_line(lost: u64, status: &str) -> String {
+    format!("{{\"event\":\"status\",\"lost\":{lost},\"status\":{status}}}\n")
 }
 
 /// A frame of the scope as a line, behind so many that were lost.

@@ -17,7 +17,7 @@ use crate::controller::{
     Asked, Clerk, ControllerState, Desk, From, Mode, NotTaken, PLACES, TakenLine,
 };
 use crate::judge::Refusal;
-use crate::operator::{Answer, Lease, News, Problem, Talk};
+use crate::operator::{Answer, Lease, Look, News, Problem, Talk};
 
 /// Bytes that are kept of a sender that does not wait for answers; more of them wait with the system.
 const MAX_KEPT_BYTES: usize = 64 * 1024;
@@ -770,7 +770,7 @@ impl Talk for Sender {
         [soon, self.greet_at].into_iter().flatten().min()
     }
 
-    fn telemetry(&mut self, _lost: u64) -> String {
+    fn telemetry(&mut self, _lost: u64, _look: &mut Look) -> String {
         String::new()
     }
 

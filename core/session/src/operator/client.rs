@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use rustix::event::PollFlags;
 
-use super::house::Talk;
+use super::house::{Look, Talk};
 use super::lease::Lease;
 use super::listen::Stream;
 use super::outbox::Outbox;
@@ -187,10 +187,11 @@ impl Client {
     }
 
     /// Sends the status line that is due, if one is; whether one was.
-    pub fn show_status(&mut self, now: Instant) -> bool {
+    pub fn show_status(&mut self, look: &mut Look, now: Instant) -> bool {
         let is_due = self.phase == Phase::Talking && self.session.is_due(now);
         if is_due {
-            self.outbox.telemetry(|lost| self.session.telemetry(lost));
+            self.outbox
+                .telemetry(|lost| self.session.telemetry(lost, look));
             self.send(now);
         }
         is_due

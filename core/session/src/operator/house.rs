@@ -3,11 +3,26 @@
 use std::sync::Arc;
 use std::time::Instant;
 
+use serde::Serialize;
+
 use super::hub::OperatorHub;
 use super::lease::Lease;
 use super::reply::{self, Problem};
 use super::session::{Answer, Session};
 use super::token::Tokens;
+
+/// The machine as everybody is shown it whose status line is due: it is looked at and made into text once for all of them.
+#[derive(Debug, Default)]
+pub struct Look(Option<String>);
+
+impl Look {
+    /// What was seen, as JSON; whoever asks first looks.
+    pub fn text<S: Serialize>(&mut self, look: impl FnOnce() -> S) -> &str {
+        // What is shown has neither a map with other keys than words nor anything else that is no JSON.
+        let seen = || serde_json::to_string(&look()).unwrap_or_default();
+        self.0.get_or_insert_with(seen)
+    }
+}
 
 /// One client's conversation, in whichever protocol. On the thread that serves clients.
 pub trait Talk: Send {
@@ -62,7 +77,7 @@ pub trait Talk: Send {
     /// When the next status line is due.
     fn due(&self) -> Option<Instant>;
     /// A status line that was subscribed to; so many were lost before it.
-    fn telemetry(&mut self, lost: u64) -> String;
+    fn telemetry(&mut self, lost: u64, look: &mut Look) -> String;
     /// The last line.
     fn ended(&self, lost: u64) -> String;
     /// A frame of a stream that the client has asked for; so many were lost before it.
@@ -161,8 +176,8 @@ impl Talk for Protocol1 {
         self.session.due()
     }
 
-    fn telemetry(&mut self, lost: u64) -> String {
-        reply::telemetry(&self.hub.status(), lost)
+    fn telemetry(&mut self, lost: u64, look: &mut Look) -> String {
+        reply::telemetry(look.text(|| self.hub.status()), lost)
     }
 
     fn ended(&self, lost: u64) -> String {

@@ -27,7 +27,7 @@ mod socket_file;
 mod status;
 mod token;
 
-pub(crate) use house::{House, Talk};
+pub(crate) use house::{House, Look, Talk};
 pub use hub::OperatorHub;
 pub(crate) use lease::{Lease, News};
 pub use listen::Listen;

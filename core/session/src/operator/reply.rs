@@ -98,13 +98,8 @@ pub fn status(status: &StatusLine) -> String {
 }
 
 /// A status line that was subscribed to; `lost` of them did not fit since the last one.
-pub fn telemetry(status: &StatusLine, lost: u64) -> String {
-    #[derive(Serialize)]
-    struct Telemetry<'a> {
-        status: &'a StatusLine,
-        lost: u64,
-    }
-    line(&Telemetry { status, lost })
+pub fn telemetry(status: &str, lost: u64) -> String {
+    format!("{{\"status\":{status},\"lost\":{lost}}}\n")
 }
 
 /// What becomes of the lease, to the client that holds it or held it; it is no answer.

@@ -1,30 +1,26 @@
 //! When the status lines of a subscription are due.
 
+use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
-/// Share of the interval by which each client's lines come after those of the client before: the golden ratio keeps any
-/// number of clients apart.
-const APART: f64 = 0.618_034;
+/// From here on the status lines of everybody are counted: those of one rate are due at the same moments, whenever their clients came.
+static BEGAN: LazyLock<Instant> = LazyLock::new(Instant::now);
 
-/// The times of a client's status lines. The first is due at once; those after it keep a place in the interval that is the
-/// client's own, so that clients which came together are not served together, and nobody who asks waits behind all of them.
+/// The times of a client's status lines. The first is due at once, those after it with the lines of all others of its rate: the
+/// computer wakes once and looks at the machine once for all of them, where to each at its own time it would do so hundreds of times
+/// a second.
 #[derive(Debug)]
 pub struct Rhythm {
     every: Duration,
     due: Instant,
-    /// How much sooner the second line is due than an interval after the first.
-    sooner: Duration,
 }
 
 impl Rhythm {
-    /// `rate_hz` lines a second for the client of this number, from `now` on.
-    pub fn new(rate_hz: f64, client: u64, now: Instant) -> Self {
-        let every = Duration::from_secs_f64(1.0 / rate_hz);
-        let share = (client as f64 * APART).fract();
+    /// `rate_hz` lines a second, from `now` on.
+    pub fn new(rate_hz: f64, now: Instant) -> Self {
         Self {
-            every,
+            every: Duration::from_secs_f64(1.0 / rate_hz),
             due: now,
-            sooner: every.mul_f64(share),
         }
     }
 
@@ -33,16 +29,22 @@ impl Rhythm {
         self.due
     }
 
-    /// Whether a line is due now; then it is taken as sent. What was missed in a stall is not made up for, and the lines after
-    /// it keep their place in the interval.
+    /// Whether a line is due now; then it is taken as sent. What was missed in a stall is not made up for.
     pub fn is_due(&mut self, now: Instant) -> bool {
-        let Some(late) = now.checked_duration_since(self.due) else {
+        if now < self.due {
             return false;
-        };
-        let sooner = std::mem::take(&mut self.sooner);
-        let missed = late.div_duration_f64(self.every).floor();
-        let ahead = self.every.mul_f64(missed + 1.0);
-        self.due += ahead.saturating_sub(sooner);
+        }
+        let rest =
+            |apart: Duration| Duration::from_nanos_u128(apart.as_nanos() % self.every.as_nanos());
+        // A moment that was taken before the first client came here may lie before all that is counted.
+        let before = rest(BEGAN.saturating_duration_since(now));
+        self.due = now
+            + if before.is_zero() {
+                let behind = rest(now.saturating_duration_since(*BEGAN));
+                self.every.saturating_sub(behind)
+            } else {
+                before
+            };
         true
     }
 }
@@ -54,32 +56,28 @@ mod tests {
     const EVERY: Duration = Duration::from_millis(20);
 
     #[test]
-    fn clients_that_came_together_are_not_served_together() {
-        let now = Instant::now();
-        let mut places: Vec<f64> = (1..=16)
-            .map(|client| {
-                let mut rhythm = Rhythm::new(50.0, client, now);
-                assert!(rhythm.is_due(now) && !rhythm.is_due(now));
-                (rhythm.due() - now).div_duration_f64(EVERY)
-            })
-            .collect();
-        places.sort_by(f64::total_cmp);
-        assert!(places[0] > 0.0 && places[15] <= 1.0, "{places:?}");
-        for pair in places.windows(2) {
-            assert!(pair[1] - pair[0] > 0.02, "{places:?}");
-        }
+    fn clients_of_one_rate_are_served_together_whenever_they_came() {
+        let start = Instant::now();
+        let first_due = |late_us: u64| {
+            let came = start + Duration::from_micros(late_us);
+            let mut rhythm = Rhythm::new(50.0, came);
+            assert!(rhythm.is_due(came) && !rhythm.is_due(came));
+            assert!(rhythm.due() > came && rhythm.due() <= came + EVERY);
+            rhythm.due()
+        };
+        let (first, second) = (first_due(0), first_due(7_301));
+        assert!(second == first || second == first + EVERY);
+        assert_eq!(first_due(20_000), first + EVERY);
     }
 
     #[test]
     fn a_stall_is_not_made_up_for_and_moves_nobody_to_another_place() {
         let start = Instant::now();
-        let mut rhythm = Rhythm::new(50.0, 3, start);
+        let mut rhythm = Rhythm::new(50.0, start);
         assert!(rhythm.is_due(start));
         let second = rhythm.due();
         assert!(rhythm.is_due(second + EVERY.mul_f64(3.5)));
         assert!(!rhythm.is_due(second + EVERY.mul_f64(3.6)));
-        let from = second + EVERY * 4;
-        let apart = rhythm.due().max(from) - rhythm.due().min(from);
-        assert!(apart < Duration::from_micros(1), "{apart:?}");
+        assert_eq!(rhythm.due(), second + EVERY * 4);
     }
 }

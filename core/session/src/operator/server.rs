@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
 use super::client::{Client, Standing};
-use super::house::{House, OneRun};
+use super::house::{House, Look, OneRun};
 use super::hub::OperatorHub;
 use super::lease::Lease;
 use super::listen::{Door, Listen};
@@ -25,6 +25,8 @@ const DOOR_REST: Duration = Duration::from_millis(10);
 const LONGEST_SLEEP: Duration = Duration::from_millis(50);
 /// How long clients have to read their last line when the run is over.
 const FAREWELL: Duration = Duration::from_secs(1);
+/// Most clients that are shown the machine in a round: who asks waits behind so many lines and no more.
+const MAX_SHOWN: usize = 4;
 /// Stack of the thread, bytes: it is locked into memory with the rest.
 const STACK_BYTES: usize = 256 * 1024;
 
@@ -184,13 +186,19 @@ impl Room {
         served.ok()
     }
 
-    /// Sends one status line that is due: whoever asks meanwhile is answered before the next one.
+    /// Sends some of the status lines that are due: whoever asks meanwhile is answered before the others.
     fn show_status(&mut self, now: Instant) {
-        let count = self.clients.len();
+        let (mut look, mut left) = (Look::default(), MAX_SHOWN);
+        let (count, first) = (self.clients.len(), self.next_shown);
         for step in 0..count {
-            let at = (self.next_shown + step) % count;
-            if self.guarded(at, now, |client, _| client.show_status(now)) != Some(false) {
-                self.next_shown = at + 1;
+            let at = (first + step) % count;
+            if self.guarded(at, now, |client, _| client.show_status(&mut look, now)) == Some(false)
+            {
+                continue;
+            }
+            self.next_shown = at + 1;
+            left -= 1;
+            if left == 0 {
                 return;
             }
         }

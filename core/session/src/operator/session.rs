@@ -167,7 +167,7 @@ impl Session {
                 "no token is asked for here".to_string(),
             )),
             Request::Subscribe(rate_hz) => {
-                self.subscription = rate_hz.map(|rate_hz| Rhythm::new(rate_hz, self.client, now));
+                self.subscription = rate_hz.map(|rate_hz| Rhythm::new(rate_hz, now));
                 Ok(reply::ok(
                     &json!({ "subscribe": { "rate_hz": rate_hz.unwrap_or(0.0) } }),
                 ))
