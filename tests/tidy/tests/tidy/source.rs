@@ -67,11 +67,10 @@ fn has_method(text: &str, owner: &str, name: &str) -> bool {
         if !line.starts_with(' ') && !line.is_empty() && !line.starts_with('}') {
             inside = names(line, "trait", owner) || implements(line, owner);
         }
-        if inside
-            && line.starts_with("    ")
-            && !line.starts_with("     ")
-            && names(line, "fn", name)
-        {
+        let depth = line.len() - line.trim_start().len();
+        // What a macro makes of another method is declared within the macro's braces: `fn name = other, …`.
+        let is_declared = depth == 8 && line.contains(&format!("fn {name} = "));
+        if inside && (depth == 4 && names(line, "fn", name) || is_declared) {
             return true;
         }
     }
