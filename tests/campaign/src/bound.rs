@@ -1,6 +1,6 @@
 //! How long a run may take at most: crude, but of its own, so that a machine that stands still or crawls is found.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use tandem_host::{Switches, each_block};
 use tandem_machine::Machine;
@@ -57,27 +57,39 @@ pub struct Asks {
     pub sways: Sways,
 }
 
-/// For each line whose rotary axes turn beside linear ones, how many times as long its way is with them, a degree counted as
-/// a millimetre, as the way that its feed counts.
+/// How much the rotary axes of a program turn.
 #[derive(Clone, Debug, Default)]
-pub struct Sways(BTreeMap<u32, f64>);
+pub struct Sways {
+    /// For each line whose rotary axes turn beside linear ones, how many times as long its way is with them, a degree counted as
+    /// a millimetre, as the way that its feed counts.
+    beside: BTreeMap<u32, f64>,
+    /// Lines with blocks in which rotary axes alone turn: their feed counts radians.
+    alone: BTreeSet<u32>,
+}
 
 impl Sways {
     /// The most of the lines from `first` to `last`; at least 1.
     pub fn most(&self, first: u32, last: u32) -> f64 {
         let lines = first.min(last)..=first.max(last);
-        self.0
+        self.beside
             .range(lines)
             .fold(1.0, |most, (_, times)| most.max(*times))
+    }
+
+    /// Whether a line has blocks in which rotary axes alone turn.
+    pub fn turns_alone(&self, line: u32) -> bool {
+        self.alone.contains(&line)
     }
 
     fn add(&mut self, block: &Block, moved: &[(usize, f64)], rotary: impl Fn(usize) -> bool) {
         let turned = moved.iter().filter(|(axis, _)| rotary(*axis));
         let squares: f64 = turned.map(|(_, by)| by * by).sum();
         let moves_linear = moved.iter().any(|(axis, by)| !rotary(*axis) && *by > 0.0);
-        if squares > 0.0 && moves_linear {
+        if squares > 0.0 && !moves_linear {
+            self.alone.insert(block.line);
+        } else if squares > 0.0 {
             let times = (1.0 + squares / (block.length_mm * block.length_mm)).sqrt();
-            let most = self.0.entry(block.line).or_insert(1.0);
+            let most = self.beside.entry(block.line).or_insert(1.0);
             *most = most.max(times);
         }
     }

@@ -194,7 +194,8 @@ impl RunObserver for Kept {
             let at = sample.command[from];
             row.command[to] = if rotary { at.to_degrees() } else { at };
         }
-        // Where only rotary axes move, the feed is theirs.
+        // Where only rotary axes move, the feed is theirs; so it is where a period ends in a block of that kind, whatever it drove
+        // before.
         let moves = |axis: &(usize, bool)| {
             !axis.1
                 && self
@@ -205,7 +206,7 @@ impl RunObserver for Kept {
         let turns = self.axes.iter().any(|axis| axis.1) && !self.axes.iter().any(moves);
         let step = sample.feed_mm_per_s * self.period_s;
         let before = self.rows.last().map_or(sample.line, |last| last.line);
-        let way = if turns {
+        let way = if turns || self.sways.turns_alone(sample.line) {
             step.to_degrees()
         } else {
             step * self.sways.most(before, sample.line)
