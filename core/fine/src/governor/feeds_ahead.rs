@@ -6,10 +6,15 @@
 //! accelerates by `2w·q″ + q′·dw/dτ`: what the limits leave for dw/dτ is linear in w. Laid out backward from the feeds ahead
 //! with the least dw/dτ this gives the highest w from which each of them can be met.
 //!
+//! Along a piece w is linear. What the feed allows of it, `(allowed / path speed)² / 2`, is not: while the plan gets fast it falls
+//! as a convex curve, and the chord of a piece lies above it. Taken instead is the tangent in the middle, below the curve
+//! everywhere, on pieces in which the path speed changes little. And while the one rises and the other falls within a period, its
+//! mean lies above its ends.
+//!
 //! It looks back over up to 96 pieces of the queued plan.
 
 use super::tuning::FEEDS_AHEAD_LIMIT_SHARE;
-use tandem_sdk::Segment;
+use tandem_sdk::{Segment, SegmentFlags, derivatives};
 
 use super::{Governor, TOLERANCE};
 use crate::period_points::{PeriodPoint, PeriodPoints};
@@ -19,6 +24,10 @@ use crate::plan_ahead::PlanCursor;
 const PIECES: usize = 96;
 /// Share of its distance by which a piece may be long; one period at least.
 const LONGER: f64 = 0.05;
+/// Share by which the path speed changes in a piece where it is beyond the feed.
+const FASTER: f64 = 0.1;
+/// Share of a period that such a piece is long at least.
+const SHORTEST_PERIODS: f64 = 0.125;
 /// w of the highest rate.
 const MOST: f64 = 0.5;
 
@@ -75,15 +84,18 @@ impl Governor {
     pub fn look_ahead(&mut self, mut place: PlanCursor<'_>, ratio: f64) {
         let mut pieces: [Option<(&Segment, f64, f64)>; PIECES] = [None; PIECES];
         let (mut count, mut offset_s, mut least) = (0, 0.0, MOST);
+        let period_s = self.period_s;
+        let feeds = Feeds { ratio, period_s };
         while let Some((segment, from_s)) = place.segment().filter(|_| count < PIECES) {
-            let piece_s = place.stretch_s((LONGER * offset_s).max(self.period_s));
+            let longest_s = (LONGER * offset_s).max(self.period_s);
+            let shortest_s = SHORTEST_PERIODS * self.period_s;
+            let piece_s = place.stretch_s(
+                longest_s.min(feeds.changing_s(segment, from_s, longest_s).max(shortest_s)),
+            );
             if piece_s > 0.0 {
                 pieces[count] = Some((segment, from_s, piece_s));
-                least = least.min(highest(segment, from_s, ratio)).min(highest(
-                    segment,
-                    from_s + piece_s,
-                    ratio,
-                ));
+                let [from, to] = feeds.highest_in(segment, from_s, piece_s);
+                least = least.min(from).min(to);
                 self.feeds_ahead.nodes[count] = Node { offset_s, w: MOST };
                 (count, offset_s) = (count + 1, offset_s + piece_s);
                 self.feeds_ahead.nodes[count] = Node { offset_s, w: MOST };
@@ -95,23 +107,30 @@ impl Governor {
         }
         self.feeds_ahead.count = if least < MOST { count + 1 } else { 0 };
         if least < MOST {
-            self.lay_out(&pieces[..count], ratio);
+            self.lay_out(&pieces[..count], feeds);
         }
     }
 
-    fn lay_out(&mut self, pieces: &[Option<(&Segment, f64, f64)>], ratio: f64) {
+    fn lay_out(&mut self, pieces: &[Option<(&Segment, f64, f64)>], feeds: Feeds) {
         let mut w = MOST;
         for (number, piece) in pieces.iter().enumerate().rev() {
             let Some((segment, from_s, piece_s)) = *piece else {
                 continue;
             };
-            w = w.min(highest(segment, from_s + piece_s, ratio));
+            let [from, to] = feeds.highest_in(segment, from_s, piece_s);
+            w = w.min(to);
             self.feeds_ahead.nodes[number + 1].w = w;
+            // The rate changes evenly over a period, or what lies of it in a segment: as much as the limits leave all along it.
+            let period_s = (2.0 * w).sqrt() * self.period_s;
+            let first_s = (from_s - period_s).max(0.0);
+            let last_s = (from_s + piece_s + period_s).min(segment.duration_s);
             self.feeds_ahead.points.clear();
-            self.feeds_ahead.points.add(segment, from_s, piece_s);
+            self.feeds_ahead
+                .points
+                .add(segment, first_s, last_s - first_s);
             let slope = self.min_slope(w);
-            let slope = slope.max(self.min_slope((w - piece_s * slope).min(MOST)));
-            w = (w - piece_s * slope).min(highest(segment, from_s, ratio));
+            let slope = slope.max(self.min_slope((w - (piece_s + period_s) * slope).min(MOST)));
+            w = (w - piece_s * slope).min(from);
             self.feeds_ahead.nodes[number].w = w;
         }
     }
@@ -149,16 +168,60 @@ fn min_slope_of_axis(point: &PeriodPoint, axis: usize, w: f64, limit: f64) -> f6
     }
 }
 
-/// w at which the path speed is `ratio` of the programmed feed at local time `t_s` of `segment`, and no more than the greatest.
-fn highest(segment: &Segment, t_s: f64, ratio: f64) -> f64 {
-    let speed = segment.path_speed_mm_per_s(t_s);
-    let allowed = ratio * segment.feed_mm_per_s;
-    let free = segment.flags.contains(tandem_sdk::SegmentFlags::RAPID)
-        || speed * (1.0 - TOLERANCE) <= allowed;
-    if free {
-        MOST
-    } else {
-        (allowed / speed).powi(2) / 2.0
+/// The feeds that are to be kept.
+#[derive(Clone, Copy, Debug)]
+struct Feeds {
+    /// Share of the programmed ones.
+    ratio: f64,
+    period_s: f64,
+}
+
+impl Feeds {
+    fn allowed_mm_per_s(&self, segment: &Segment) -> f64 {
+        self.ratio * segment.feed_mm_per_s
+    }
+
+    /// How long the path speed takes from local time `from_s` of `segment` to change by its share, where it comes beyond the feed
+    /// within `longest_s`; infinite where it does not, s.
+    fn changing_s(&self, segment: &Segment, from_s: f64, longest_s: f64) -> f64 {
+        let ends = [from_s, (from_s + longest_s).min(segment.duration_s)];
+        if ends.iter().all(|t| self.highest(segment, *t) >= MOST) {
+            return f64::INFINITY;
+        }
+        let [speed, acceleration, _] = derivatives(&segment.path, from_s);
+        FASTER * speed.max(self.allowed_mm_per_s(segment)) / acceleration.abs()
+    }
+
+    /// What is allowed of w at both ends of a piece of `segment`: the line between them lies nowhere above what is at each place.
+    fn highest_in(&self, segment: &Segment, from_s: f64, piece_s: f64) -> [f64; 2] {
+        let ends = [0.0, piece_s].map(|t| self.highest(segment, from_s + t));
+        let tangent = |at_s: f64| {
+            let w = self.highest(segment, from_s + at_s);
+            let [speed, acceleration, _] = derivatives(&segment.path, from_s + at_s);
+            let slope = -2.0 * w * acceleration / speed;
+            (w < MOST).then(|| [w - slope * at_s, w + slope * (piece_s - at_s)])
+        };
+        // Where the middle is below the feed, an end is at the most that is allowed.
+        let line = tangent(piece_s / 2.0)
+            .or_else(|| tangent(piece_s))
+            .or_else(|| tangent(0.0))
+            .unwrap_or(ends);
+        [0, 1].map(|end| ends[end].min(line[end]).max(0.0))
+    }
+
+    /// w at which the feed is kept at local time `t_s` of `segment`, and no more than the greatest.
+    fn highest(&self, segment: &Segment, t_s: f64) -> f64 {
+        let [speed, acceleration, _] = derivatives(&segment.path, t_s);
+        let allowed = self.allowed_mm_per_s(segment);
+        let free =
+            segment.flags.contains(SegmentFlags::RAPID) || speed * (1.0 - TOLERANCE) <= allowed;
+        if free {
+            return MOST;
+        }
+        let rate = allowed / speed;
+        // A period at both ends of which the feed is met, the plan getting faster by the share δ in it, has a mean δ²/6 above.
+        let faster = (acceleration.abs() * rate * self.period_s / speed).min(1.0);
+        (rate / (1.0 + faster * faster / 6.0)).powi(2) / 2.0
     }
 }
 
@@ -184,19 +247,28 @@ mod tests {
         limits
     }
 
+    /// X slows down by `used` of the `most` that it has, from 10 mm/s by `share` of that, while Y gets fast.
+    fn turning(most: f64, used: f64, share: f64, gain: f64) -> Segment {
+        let (from, braking) = (10.0, most * used);
+        let time_s = share * from / most;
+        let faster = gain * from / time_s / 2.0;
+        let mut segment = Segment::rest(&AxisVector::ZERO, time_s);
+        segment.coefficients[0] = [0.0, from, -braking / 2.0, 0.0, 0.0, 0.0];
+        segment.coefficients[1] = [0.0, 0.0, faster, 0.0, 0.0, 0.0];
+        segment.path = [0.0, from, faster, 0.0, 0.0, 0.0];
+        segment.feed_mm_per_s = from;
+        segment
+    }
+
     proptest! {
         /// X slows down with nearly all that it has while Y gets fast: from the rate that is given, lowering it with what the
         /// limits leave keeps the feed at every place.
         #[test]
         fn from_the_rate_that_is_given_the_feed_can_be_kept(
-            most in 10.0..1000.0f64, used in 0.3..1.0f64, from in 1.0..20.0f64, gain in 0.5..4.0f64, share in 0.1..0.9f64,
+            most in 10.0..1000.0f64, used in 0.3..1.0f64, gain in 0.5..4.0f64, share in 0.1..0.9f64,
         ) {
-            let (braking, time_s) = (most * used, share * from / most);
-            let mut segment = Segment::rest(&AxisVector::ZERO, time_s);
-            segment.coefficients[0] = [0.0, from, -braking / 2.0, 0.0, 0.0, 0.0];
-            segment.coefficients[1] = [0.0, 0.0, gain * from / time_s / 2.0, 0.0, 0.0, 0.0];
-            segment.path = [0.0, from, gain * from / time_s / 2.0, 0.0, 0.0, 0.0];
-            segment.feed_mm_per_s = from;
+            let segment = turning(most, used, share, gain);
+            let (from, braking, time_s) = (segment.feed_mm_per_s, most * used, segment.duration_s);
             let limits = limits([most, 1e6]);
             let mut governor = Governor::new(&limits, 2, 0.02 * time_s);
             governor.look_ahead(PlanAhead::new(&segment, [&[], &[]], TWO_LINEAR).begin(0.0), 1.0);
@@ -208,6 +280,36 @@ mod tests {
                 prop_assert!(w <= 1.001 * allowed, "{w} at {t} of {time_s}, {allowed} is allowed");
                 let speed = from - braking * t;
                 w -= step_s * (most - 2.0 * w * braking).max(0.0) / speed;
+            }
+        }
+
+        /// The same by whole periods, in each of which the rate changes evenly: their means keep the feed too.
+        #[test]
+        fn from_the_rate_that_is_given_whole_periods_keep_the_feed(
+            most in 10.0..1000.0f64, used in 0.3..1.0f64, gain in 0.5..4.0f64, share in 0.1..0.9f64, periods in 3.0..50.0f64,
+        ) {
+            let segment = turning(most, used, share, gain);
+            let (feed, period_s) = (segment.feed_mm_per_s, segment.duration_s / periods);
+            let limits = limits([most, 1e6]);
+            let mut governor = Governor::new(&limits, 2, period_s);
+            let mut points = PeriodPoints::new(&limits, 2);
+            let (mut t, mut sigma) = (0.0, 1.0);
+            while t + sigma * period_s < segment.duration_s {
+                governor.look_ahead(PlanAhead::new(&segment, [&[], &[]], TWO_LINEAR).begin(t), 1.0);
+                if t == 0.0 {
+                    sigma = governor.rate_in_time(0.0);
+                }
+                let mut end = sigma;
+                for _ in 0..8 {
+                    let passed_s = f64::midpoint(sigma, end) * period_s;
+                    points.clear();
+                    points.add(&segment, t, passed_s);
+                    end = governor.choose_within(sigma, governor.rate_in_time(passed_s), &points, period_s);
+                }
+                let passed_s = f64::midpoint(sigma, end) * period_s;
+                let mean = (segment.path_mm(t + passed_s) - segment.path_mm(t)) / period_s;
+                prop_assert!(mean < (1.0 + 5e-4) * feed, "{mean} mm/s for {feed} at {t} of {} s", segment.duration_s);
+                (t, sigma) = (t + passed_s, end);
             }
         }
     }
