@@ -276,17 +276,20 @@ mod tests {
             // That stop from 10.5 mm/s, less its first second.
             (10.0, -1.0, 0.0, 7.25 * 5.25 - (10.5 - 1.0 / 6.0)),
         ] {
-            let way_mm = Along {
-                speed_mm_per_s: speed,
-                acceleration_mm_per_s2: acceleration,
-                max_mm_per_s2: 2.0,
-                jerk_mm_per_s3: 1.0,
+            // The same way where time passes three times as fast.
+            for faster in [1.0, 3.0f64] {
+                let way_mm = Along {
+                    speed_mm_per_s: faster * speed,
+                    acceleration_mm_per_s2: faster.powi(2) * acceleration,
+                    max_mm_per_s2: faster.powi(2) * 2.0,
+                    jerk_mm_per_s3: faster.powi(3),
+                }
+                .way_to_mm(faster * end_mm_per_s);
+                assert!(
+                    (way_mm - expected_mm).abs() < 1e-9,
+                    "{speed} {acceleration} to {end_mm_per_s}: {way_mm} mm, {faster} times as fast"
+                );
             }
-            .way_to_mm(end_mm_per_s);
-            assert!(
-                (way_mm - expected_mm).abs() < 1e-9,
-                "{speed} {acceleration} to {end_mm_per_s}: {way_mm} mm"
-            );
         }
     }
 

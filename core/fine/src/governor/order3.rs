@@ -427,6 +427,26 @@ mod tests {
         }
     }
 
+    /// The plan gets faster with all that the axis has while σ rises: that is more than it has, and to bring it down within the period takes
+    /// more jerk than there is.
+    #[test]
+    fn where_both_cannot_be_kept_acceleration_is_kept_and_jerk_goes_beyond_its_limit() {
+        let limits = limits(1000.0, 10_000.0);
+        let (speed, acceleration) = (50.0, 1000.0);
+        let segment = along_x([speed, acceleration, 0.0], 0.1);
+        let mut governor = Governor::new(&limits, 2, PERIOD_S);
+        (governor.sigma, governor.rate_per_s) = (0.95, 2.5);
+        let mut horizon = Horizon::new(&limits, 2, PERIOD_S);
+        horizon.fill(&Ahead::new(&segment, Some(0.0), 0, None), PERIOD_S);
+        let chosen = governor.relaxed(&horizon, &Steps::default());
+        assert!(chosen.relaxed);
+        let (sigma, rate) = (governor.sigma(), governor.rate_per_s());
+        let driven = sigma * sigma * acceleration + rate * (speed + acceleration * chosen.delta_s);
+        assert!((980.0..=1000.0).contains(&driven), "{driven} mm/s²");
+        let jerk = 3.0 * acceleration * 0.95 * 2.5 + speed * (rate - 2.5) / PERIOD_S;
+        assert!((-60_000.0..-11_000.0).contains(&jerk), "{jerk} mm/s³");
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
 

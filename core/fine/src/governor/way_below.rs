@@ -380,6 +380,52 @@ mod tests {
         assert_eq!(f64::from(most), FEED_WAY_PERIODS[1]);
     }
 
+    /// At twice the feed on a line: lowering the rate to where the feed is kept takes little more than the shortest time.
+    #[test]
+    fn a_rate_is_lowered_to_the_feed_without_delay() {
+        for period_s in [1e-3, 5e-4] {
+            let limits = limits(100.0, 1.0, 1000.0);
+            let mut segment = Segment::rest(&AxisVector::ZERO, 10.0);
+            segment.coefficients[0][1] = 20.0;
+            segment.path[1] = 20.0;
+            segment.feed_mm_per_s = 10.0;
+            let horizon = Horizon::new(&limits, 2, period_s);
+            let mut ways = WaySearch::new(period_s);
+            let ahead = Ahead::new(&segment, Some(0.0), 0, None);
+            let here = RateState {
+                sigma: 1.0,
+                rate_per_s: 0.0,
+                place: ahead.place(TWO_LINEAR),
+                recent: Recent::default(),
+            };
+            let aim = Aim {
+                goal: Goal::run(1.0, 10.0, None),
+                ratio: 1.0,
+                kept_rate: 0.5,
+                path: [20.0, 0.0, 0.0],
+            };
+            let mut below = Below::new(&aim, &here, period_s);
+            below.steps_left = FEED_WAY_STEPS;
+            let watch = Watch::new(&here, aim.ratio);
+            assert!(below.becomes_slow((here, watch), &mut ways, &horizon));
+            let (mut way, mut periods) = (here, 0.0);
+            while let Some((change, _)) = ways.tried.next() {
+                way.pass(change, period_s);
+                periods += 1.0;
+            }
+            assert!(
+                (0.44..=0.5).contains(&way.sigma),
+                "it ends at {}",
+                way.sigma
+            );
+            assert!(way.rate_per_s.abs() < 1e-9, "{} 1/s", way.rate_per_s);
+            // From 20 to 9 mm/s, with 1000 mm/s³.
+            let shortest_s = 2.0 * f64::sqrt(11.0 / 1000.0);
+            let took = periods * period_s / shortest_s;
+            assert!((0.9..1.3).contains(&took), "{took} of the shortest time");
+        }
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
 

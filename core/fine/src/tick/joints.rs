@@ -244,3 +244,74 @@ fn slower(config: &FineConfig, guard: &Guard, axes: usize) -> AxisVector {
     }
     joints
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tandem_sdk::{AxisLimits, Limits};
+
+    /// Joints are twice the axes.
+    struct Doubled;
+
+    impl Kinematics for Doubled {
+        fn to_joints(&self, axes: &AxisVector) -> AxisVector {
+            *axes + *axes
+        }
+
+        fn to_axes(&self, joints: &AxisVector) -> AxisVector {
+            AxisVector(joints.0.map(|joint| joint / 2.0))
+        }
+    }
+
+    fn config() -> FineConfig {
+        FineConfig::new(0.001, Limits::new(&[AxisLimits::unlimited(); 2]).unwrap())
+    }
+
+    fn plain() -> JointSpace {
+        JointSpace::new(&config(), None)
+    }
+
+    fn doubled() -> JointSpace {
+        JointSpace::new(&config(), Some(Box::new(Doubled)))
+    }
+
+    #[test]
+    fn what_homing_has_found_is_between_axes_and_joints_in_both_directions() {
+        let (axes, found) = (
+            AxisVector::from_slice(&[10.0, -4.0]),
+            AxisVector::from_slice(&[0.5, 3.0]),
+        );
+        let mut space = plain();
+        *space.offset_mut() = found;
+        let joints = space.joints_of(&config(), &axes);
+        assert_eq!(joints, AxisVector::from_slice(&[10.5, -1.0]));
+        assert_eq!(space.axes_alone(&joints), Some(axes));
+        let mut space = doubled();
+        *space.offset_mut() = found;
+        let joints = space.joints_of(&config(), &axes);
+        assert_eq!(joints, AxisVector::from_slice(&[20.5, -5.0]));
+        assert_eq!(space.axes_alone(&joints), None, "the kinematics are asked");
+        assert_eq!(
+            space.axes_by_kinematics(&config(), &joints).ok(),
+            Some(axes)
+        );
+        assert_eq!(*space.last_axes(), axes);
+    }
+
+    #[test]
+    fn the_loop_after_knows_what_homing_has_found_and_where_the_axes_were() {
+        let mut last = doubled();
+        *last.offset_mut() = AxisVector::from_slice(&[0.5, 3.0]);
+        let joints = AxisVector::from_slice(&[20.5, -5.0]);
+        let axes = last.axes_by_kinematics(&config(), &joints).unwrap();
+        let mut next = doubled();
+        next.take_over(&last);
+        assert_eq!((next.offset(), next.last_axes()), (last.offset(), &axes));
+    }
+
+    #[test]
+    fn joints_that_are_axes_are_not_like_those_of_kinematics() {
+        assert!(plain().is_like(&plain()) && doubled().is_like(&doubled()));
+        assert!(!plain().is_like(&doubled()) && !doubled().is_like(&plain()));
+    }
+}

@@ -42,6 +42,8 @@ pub struct Bench {
     epoch: u32,
     stop_on: StopOn,
     line: u32,
+    /// How long the path coordinate is beside the way of the axis.
+    path_share: f64,
 }
 
 impl Bench {
@@ -130,7 +132,13 @@ impl Bench {
             epoch: 0,
             stop_on: StopOn::default(),
             line: 1,
+            path_share: 1.0,
         }
+    }
+
+    /// The path coordinate of what is queued from here on is this share of the way of the axis.
+    pub fn shorten_path(&mut self, share: f64) {
+        self.path_share = share;
     }
 
     /// What the machine is doing.
@@ -264,7 +272,8 @@ impl Bench {
             0.0,
             0.0,
         ];
-        (segment.coefficients[0], segment.path) = (motion, motion);
+        segment.coefficients[0] = motion;
+        segment.path = motion.map(|term| self.path_share * term);
         segment.flags = if last {
             SegmentFlags::ENDS_AT_REST
         } else {

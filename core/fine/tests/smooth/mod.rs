@@ -47,6 +47,8 @@ pub fn profile(length: f64, feed: f64, acceleration: f64, jerk: f64) -> Pieces {
 pub struct Plan {
     pieces: Pieces,
     feed: f64,
+    /// From this time on the programmed feed is this share of it.
+    slower: (f64, f64),
     path: Box<dyn Fn(f64) -> [f64; 2]>,
 }
 
@@ -55,7 +57,16 @@ impl Plan {
         Self {
             pieces,
             feed,
+            slower: (f64::INFINITY, 1.0),
             path: Box::new(path),
+        }
+    }
+
+    /// The same motion, of which the program asks for less from `from_s` on: `share` of the feed.
+    pub fn with_lower_feed(self, from_s: f64, share: f64) -> Self {
+        Self {
+            slower: (from_s, share),
+            ..self
         }
     }
 
@@ -123,6 +134,9 @@ impl Plan {
         segment.flags = SegmentFlags::default();
         (segment.order, segment.line) = (3, 1);
         segment.feed_mm_per_s = self.feed;
+        if from + 1e-9 >= self.slower.0 {
+            segment.feed_mm_per_s *= self.slower.1;
+        }
         segment.stop_deceleration_mm_per_s2 = 500.0;
         segment
     }

@@ -92,3 +92,67 @@ fn the_feed_is_kept_on_a_circle_that_leaves_little_to_slow_down_with() {
         }
     }
 }
+
+/// The path coordinate is a polynomial of its own: where it falls short of what the axes drive, their way is what a feed is of.
+#[test]
+fn the_feed_is_that_of_the_axes_where_the_path_coordinate_falls_short_of_their_way() {
+    for share in [1.0, 0.998, 0.995] {
+        let mut bench = Bench::planned_at(2.0);
+        bench.shorten_path(share);
+        bench.peak(1.5 * FEED_MM_PER_S);
+        let (mut fastest, mut before_mm) = (0.0_f64, 0.0);
+        for _ in 0..200 {
+            bench.fine.tick();
+            while let Ok(sample) = bench.host.samples.pop() {
+                fastest = fastest.max((sample.command[0] - before_mm) / common::PERIOD_S);
+                before_mm = sample.command[0];
+            }
+        }
+        assert!(
+            fastest < FEED_MM_PER_S * MOST + ROUNDING_MM_PER_S,
+            "{share}: {fastest}"
+        );
+        assert!(fastest > 0.97 * FEED_MM_PER_S, "{share}: {fastest}");
+    }
+}
+
+/// A lower feed is kept from where the program asks for it, and braking for it begins no earlier than that takes.
+#[test]
+fn a_lower_feed_ahead_is_kept_from_its_place_on_and_slows_nothing_long_before() {
+    let (planned, share, line_mm) = (80.0, 0.6, 120.0);
+    let pieces = profile(
+        line_mm,
+        planned,
+        0.999 * LIMITS.acceleration,
+        0.999 * LIMITS.jerk,
+    );
+    let middle_s = pieces.iter().map(|(_, duration)| duration).sum::<f64>() / 2.0;
+    // A segment begins every 4 ms.
+    let from_s = 4e-3 * (middle_s / 4e-3).round();
+    let plan = Plan::new(pieces, planned, |s| [0.8 * s, 0.6 * s]).with_lower_feed(from_s, share);
+    let place_mm = line_mm / 2.0 + planned * (from_s - middle_s);
+    let done = Machine::planned_at(&plan, 2.0).run_to_end();
+    done.assert_kept("a lower feed ahead");
+    let (mut has_reached, mut passed) = (false, 0);
+    for pair in done.sent.windows(2) {
+        let at = |sample: &[f64; 2]| sample[0].hypot(sample[1]);
+        let speed = (at(&pair[1]) - at(&pair[0])) / smooth::PERIOD_S;
+        has_reached |= speed > 0.999 * planned / 2.0;
+        if at(&pair[1]) < place_mm - 5.0 && has_reached {
+            assert!(
+                speed > 0.99 * planned / 2.0,
+                "{speed} at {} mm",
+                at(&pair[1])
+            );
+            passed += 1;
+        }
+        if at(&pair[0]) > place_mm {
+            let lower = share * planned / 2.0;
+            assert!(
+                speed < lower * MOST + ROUNDING_MM_PER_S,
+                "{speed} for {lower}"
+            );
+        }
+    }
+    assert!(passed > 500, "only {passed} samples at the higher feed");
+}
