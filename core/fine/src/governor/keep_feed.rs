@@ -134,8 +134,9 @@ impl Governor {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plan_ahead::{Axes, PlanAhead};
-    use tandem_sdk::{AxisVector, Segment};
+    use crate::plan_ahead::{Ahead, Axes, PlanAhead};
+    use crate::steps::Recent;
+    use tandem_sdk::{AxisLimits, AxisVector, MAX_AXES, Segment, SegmentFlags};
 
     const PERIOD_S: f64 = 0.001;
 
@@ -172,5 +173,57 @@ mod tests {
         let mut moves = Segment::rest(&AxisVector::ZERO, 0.1);
         (moves.coefficients[0][1], moves.path[1]) = (5.0, 5.0);
         assert!(!stands(&moves, 0.05));
+    }
+
+    /// The plan gets faster at a constant rate and goes beyond the feed: the speed comes to the feed in one bend, is at it soon after the
+    /// plan is, and stays there.
+    #[test]
+    fn the_speed_bends_to_the_feed_once_and_stays_at_it() {
+        const JERK: f64 = 1000.0;
+        let limits = [AxisLimits {
+            min_mm: -1000.0,
+            max_mm: 1000.0,
+            feed_mm_per_s: 1000.0,
+            rapid_mm_per_s: 1000.0,
+            acceleration_mm_per_s2: 500.0,
+            jerk_mm_per_s3: JERK,
+            speed_difference_mm_per_s: 0.0,
+        }; MAX_AXES];
+        let governor = Governor::new(&limits, 2, PERIOD_S);
+        for (rise, feed) in [(10.0, 12.0), (40.0, 20.0), (80.0, 30.0)] {
+            let mut segment = Segment::rest(&AxisVector::ZERO, 2.0);
+            segment.coefficients[0] = [0.0, 10.0, rise / 2.0, 0.0, 0.0, 0.0];
+            segment.path = segment.coefficients[0];
+            segment.flags = SegmentFlags::default();
+            let ahead = Ahead::new(&segment, Some(0.0), 0, None);
+            let mut horizon = Horizon::new(&limits, 2, PERIOD_S);
+            horizon.fill(&ahead, PERIOD_S);
+            let mut way = RateState {
+                sigma: 1.0,
+                rate_per_s: 0.0,
+                place: ahead.place(X_AND_A),
+                recent: Recent::default(),
+            };
+            let meets_s = (feed - 10.0) / rise;
+            let (mut t, mut rises) = (0.0, vec![rise]);
+            while t < meets_s + 0.3 {
+                // Were there no feed, σ would stay as it is.
+                let free = -way.rate_per_s / PERIOD_S;
+                let change = governor.below(feed, free.max(0.0), &way, &horizon);
+                way.pass(change, PERIOD_S);
+                t += PERIOD_S;
+                let pace = way.place.pace().unwrap();
+                let speed = way.sigma * pace.speed;
+                assert!(speed < feed * (1.0 + 1e-6), "{speed} for {feed} at {t} s");
+                rises.push(way.sigma * way.sigma * pace.rise + pace.speed * way.rate_per_s);
+                if t > meets_s + 2.0 * rise / JERK + 0.02 {
+                    assert!(speed > 0.999 * feed, "{speed} for {feed} at {t} s");
+                }
+            }
+            for pair in rises.windows(2) {
+                let change = (pair[1] - pair[0]) / PERIOD_S;
+                assert!((-JERK..1.0).contains(&change), "{change} mm/s³ for {feed}");
+            }
+        }
     }
 }
