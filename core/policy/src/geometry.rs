@@ -205,6 +205,38 @@ mod tests {
         }
     }
 
+    /// A parabola that rises and falls again: X goes on all the way, Y first forward and then back.
+    #[test]
+    fn the_shares_of_a_curve_are_those_of_all_its_places() {
+        let point = |x: f64, y: f64| AxisVector::from_slice(&[x, y, 0.0]);
+        let data = tandem_sdk::NurbsData {
+            degree: 2,
+            control_points: vec![point(0.0, 0.0), point(10.0, 10.0), point(20.0, 0.0)],
+            weights: vec![1.0; 3],
+            knots: vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0],
+        };
+        let block = Block {
+            kind: BlockKind::Nurbs,
+            ..Block::at(AxisVector::ZERO)
+        };
+        let ways = Ways::of(&block, Some(data.curve()), &axes());
+        let (diagonal, near) = (0.5_f64.sqrt(), |one: f64, other: f64| {
+            (one - other).abs() < 1e-6
+        });
+        assert!(
+            near(ways.lowest[0], diagonal) && near(ways.highest[0], 1.0),
+            "{ways:?}"
+        );
+        assert!(
+            near(ways.lowest[1], -diagonal) && near(ways.highest[1], diagonal),
+            "{ways:?}"
+        );
+        assert!(
+            near(ways.start[1], diagonal) && near(ways.end[1], -diagonal),
+            "{ways:?}"
+        );
+    }
+
     #[test]
     fn cosines_see_the_turning_points() {
         assert_eq!(cosines(-0.1, 0.1).1, 1.0);

@@ -358,3 +358,55 @@ fn region(memory: &[u8], address: u32, bytes: usize, what: &str) -> Result<usize
 fn wrong(what: impl Into<String>) -> Refusal {
     Refusal::Layout(what.into())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::abi::parameter as at;
+
+    /// What is read of a parameter `gain` with these bounds.
+    fn read([lowest, default, highest]: [f64; 3]) -> Result<Parameter, Refusal> {
+        let mut memory = vec![0; at::BYTES];
+        memory.extend(b"gain");
+        for (field, value) in [(at::NAME, at::BYTES), (at::NAME_BYTES, 4)] {
+            memory[field..field + 4].copy_from_slice(&(value as u32).to_le_bytes());
+        }
+        for (field, value) in [
+            (at::LOWEST, lowest),
+            (at::DEFAULT, default),
+            (at::HIGHEST, highest),
+        ] {
+            memory[field..field + 8].copy_from_slice(&value.to_le_bytes());
+        }
+        parameter(&memory, 0, false)
+    }
+
+    #[test]
+    fn the_default_of_a_parameter_lies_within_bounds_that_are_numbers() {
+        for fits in [
+            [0.0, 1.0, 2.0],
+            [0.0, 0.0, 2.0],
+            [0.0, 2.0, 2.0],
+            [3.0, 3.0, 3.0],
+        ] {
+            let parameter = read(fits).unwrap_or_else(|why| panic!("{fits:?}: {why}"));
+            let found = [parameter.lowest, parameter.default, parameter.highest];
+            assert_eq!((found, parameter.name.as_str()), (fits, "gain"));
+        }
+        let (inf, nan) = (f64::INFINITY, f64::NAN);
+        for wrong in [
+            [0.0, -1.0, 2.0],
+            [0.0, 3.0, 2.0],
+            [2.0, 1.0, 0.0],
+            [-inf, 1.0, 2.0],
+            [0.0, 1.0, inf],
+            [nan, 1.0, 2.0],
+            [0.0, nan, 2.0],
+            [0.0, 1.0, nan],
+        ] {
+            let why = read(wrong).err().map(|why| why.to_string());
+            let says = why.is_some_and(|why| why.contains("parameter gain: its default"));
+            assert!(says, "{wrong:?}");
+        }
+    }
+}

@@ -210,6 +210,16 @@ mod tests {
         assert_eq!(both[1], 0.0);
     }
 
+    #[test]
+    fn every_axis_counts_in_a_length() {
+        for axis in 0..MAX_AXES {
+            let mut vector = [0.0; MAX_AXES];
+            vector[axis] = -3.0;
+            assert_eq!(square(&vector), 9.0, "axis {axis}");
+        }
+        assert_eq!(square(&[1.0; MAX_AXES]), 8.0);
+    }
+
     /// A parabola is bent most in the middle: by its second derivative of 40 over the square of its first one of 20.
     #[test]
     fn the_curvature_of_a_curve_is_that_of_its_sharpest_place() {

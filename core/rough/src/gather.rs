@@ -139,15 +139,16 @@ impl Gathering {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::RoughConfig;
     use tandem_sdk::AxisVector;
 
     const PERIOD_S: f64 = 1.0 / 64.0;
 
     /// Stops from 50 mm/s take 0.1 s, so 0.378 s at the feed are enough.
     fn gathering() -> Gathering {
-        let mut slowness = Slowness::NONE;
+        let mut config = RoughConfig::new(PERIOD_S, PERIOD_S);
         for (speed, acceleration, jerk) in [(100.0, 1000.0, 2e4), (60.0, 2000.0, 4e4)] {
-            slowness.count(&AxisLimits {
+            config.gather_for(&AxisLimits {
                 feed_mm_per_s: speed / 2.0,
                 rapid_mm_per_s: speed,
                 acceleration_mm_per_s2: acceleration,
@@ -155,7 +156,7 @@ mod tests {
                 ..AxisLimits::unlimited()
             });
         }
-        Gathering::new(slowness)
+        Gathering::new(config.slowness)
     }
 
     /// A block of this length, mm, at this feed, mm/s.

@@ -133,3 +133,62 @@ impl Entry {
         self.ends_at_rest || next.starts_at_rest
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_feed_of_a_block_is_the_lowest_that_anything_allows_and_its_reason_is_who_did() {
+        // 10 mm along X; an axis may go 100 mm/s, and 8 blocks a second make 80 mm/s.
+        for (kind, programmed, cap, axis, feed, reason) in [
+            (
+                BlockKind::Line,
+                50.0,
+                f64::INFINITY,
+                100.0,
+                50.0,
+                LimitedBy::Feed,
+            ),
+            (BlockKind::Line, 50.0, 30.0, 100.0, 30.0, LimitedBy::Policy),
+            (BlockKind::Line, 50.0, 50.0, 100.0, 50.0, LimitedBy::Feed),
+            (BlockKind::Line, 90.0, 85.0, 100.0, 80.0, LimitedBy::Buffer),
+            (BlockKind::Line, 90.0, 80.0, 100.0, 80.0, LimitedBy::Policy),
+            (BlockKind::Line, 60.0, 55.0, 40.0, 40.0, LimitedBy::Velocity),
+            (
+                BlockKind::Rapid,
+                60.0,
+                f64::INFINITY,
+                40.0,
+                40.0,
+                LimitedBy::Feed,
+            ),
+        ] {
+            let line = tandem_rig::line(
+                &AxisVector::ZERO,
+                &AxisVector::from_slice(&[10.0]),
+                programmed,
+            );
+            let block = Block {
+                kind,
+                feed_cap_mm_per_s: cap,
+                ..line
+            };
+            let caps = FeedCaps {
+                feed_ratio: 1.0,
+                axis_mm_per_s: &[axis],
+                joint_lanes: None,
+                max_blocks_per_s: 8.0,
+            };
+            let mut entry = Entry::blank();
+            entry.set(&block, &caps);
+            let what = format!("{programmed} mm/s, cap {cap}, axis {axis}");
+            assert!(
+                (entry.feed_mm_per_s - feed).abs() < 1e-9,
+                "{what}: {}",
+                entry.feed_mm_per_s
+            );
+            assert_eq!(entry.feed_reason, reason, "{what}");
+        }
+    }
+}

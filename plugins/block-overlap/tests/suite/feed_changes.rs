@@ -136,3 +136,25 @@ fn a_fast_line_between_slow_ones_is_driven_fast() {
         "F8000 {slow_s} s, F15000 {fast_s} s"
     );
 }
+
+/// Where the path may be left by as much as that, a block overlaps the next one by all of its time constant: it ends when that one has
+/// its feed, and that one begins while it still has its own.
+#[test]
+fn blocks_that_overlap_by_a_time_constant_are_reported_to_begin_and_end_at_full_feed() {
+    let feeds = [50.0, 30.0, 40.0];
+    let points = [[0.0, 0.0], [20.0, 0.0], [20.0, 20.0], [40.0, 20.0]];
+    let mut blocks = lines(&points.map(|at| AxisVector::from_slice(&at)), |index| {
+        60.0 * feeds[index]
+    });
+    for block in &mut blocks {
+        block.time_constant_s = 0.05;
+        block.path_tolerance_mm = 10.0;
+    }
+    let context = context(&[1e5; 3], PERIOD_S);
+    let reports = run(&context, &Options::default(), &blocks, 0.008).reports;
+    let found: Vec<_> = reports
+        .iter()
+        .map(|it| [it.start_feed_mm_per_s, it.end_feed_mm_per_s])
+        .collect();
+    assert_eq!(found, [[0.0, 30.0], [50.0, 40.0], [30.0, 0.0]]);
+}
