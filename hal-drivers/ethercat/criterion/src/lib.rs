@@ -1,0 +1,1 @@
+//! Nothing: what it stands for is declared as needed where it is not used.
