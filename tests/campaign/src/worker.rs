@@ -87,6 +87,8 @@ struct Process {
     input: ChildStdin,
     lines: Receiver<String>,
     errors: Receiver<String>,
+    /// It has answered.
+    is_used: bool,
 }
 
 impl Worker {
@@ -100,12 +102,23 @@ impl Worker {
         }
     }
 
-    /// Drives a case. A worker that dies or does not answer is replaced, and its run has failed.
+    /// Drives a case. A worker that dies or does not answer is replaced, and its run has failed. What a worker keeps of the memory
+    /// of earlier runs is not the run's: where it took too much, a fresh one drives it again.
     pub fn run(&mut self, case: &Case) -> Report {
         let planner = case.planner();
-        let report = self
-            .attempt(case)
-            .unwrap_or_else(|cause| Report::failed("no-worker", cause));
+        let is_used = self.process.as_ref().is_some_and(|it| it.is_used);
+        let attempt = |worker: &mut Self| {
+            worker
+                .attempt(case)
+                .unwrap_or_else(|cause| Report::failed("no-worker", cause))
+        };
+        let mut report = attempt(self);
+        if report.kind == "memory" && is_used {
+            if let Some(process) = self.process.take() {
+                process.end();
+            }
+            report = attempt(self);
+        }
         Report { planner, ..report }
     }
 
@@ -118,6 +131,7 @@ impl Worker {
         writeln!(process.input, "{}", self.folder.display()).map_err(|e| e.to_string())?;
         match process.lines.recv_timeout(self.patience) {
             Ok(line) => {
+                process.is_used = true;
                 self.process = Some(process);
                 read(&line).ok_or_else(|| format!("a worker answers {line:?}"))
             }
@@ -169,6 +183,7 @@ impl Process {
             input,
             lines: lines_of(output),
             errors: lines_of(errors),
+            is_used: false,
         })
     }
 

@@ -178,21 +178,22 @@ fn a_failing_case_becomes_small() {
     );
 }
 
+/// A worker that is a shell script, in `folder`.
+fn script(folder: &Path, name: &str, script: &str, patience_s: u64) -> Worker {
+    let path = folder.join(name);
+    std::fs::write(&path, format!("#!/bin/sh\n{script}\n")).unwrap();
+    let mut mode = std::fs::metadata(&path).unwrap().permissions();
+    std::os::unix::fs::PermissionsExt::set_mode(&mut mode, 0o755);
+    std::fs::set_permissions(&path, mode).unwrap();
+    Worker::new(&path, &folder.join("work"), Duration::from_secs(patience_s))
+}
+
 #[test]
-fn a_worker_that_dies_or_hangs_is_one_failed_run() {
+fn a_worker_that_dies_or_hangs_is_one_failed_run_and_what_it_keeps_of_others_is_none() {
     let folder = tempfile::tempdir().unwrap();
-    let worker = |name: &str, script: &str, patience_s: u64| {
-        let path = folder.path().join(name);
-        std::fs::write(&path, format!("#!/bin/sh\nread line\n{script}\n")).unwrap();
-        let mut mode = std::fs::metadata(&path).unwrap().permissions();
-        std::os::unix::fs::PermissionsExt::set_mode(&mut mode, 0o755);
-        std::fs::set_permissions(&path, mode).unwrap();
-        Worker::new(
-            &path,
-            &folder.path().join("work"),
-            Duration::from_secs(patience_s),
-        )
-        .run(&case())
+    let worker = |name: &str, words: &str, patience_s: u64| {
+        let words = format!("read line\n{words}");
+        script(folder.path(), name, &words, patience_s).run(&case())
     };
     assert_eq!(worker("dies", "kill -ABRT $$", 60).kind, "abort");
     assert_eq!(
@@ -205,6 +206,21 @@ fn a_worker_that_dies_or_hangs_is_one_failed_run() {
         "memory"
     );
     assert_eq!(worker("hangs", "exec sleep 600", 1).kind, "hang");
+    let answer = |kind: &str, memory_mb: u32| {
+        format!("read line; printf 'x\\t{kind}\\t0\\t9\\t{memory_mb}\\t\\n'")
+    };
+    let (clean, memory) = (answer("clean", 148), answer("memory", 203));
+    let words = format!("{clean}; {memory}; read line");
+    let mut keeps = script(folder.path(), "keeps", &words, 60);
+    for _ in 0..3 {
+        let report = keeps.run(&case());
+        assert_eq!((report.kind.as_str(), report.memory_mb), ("clean", 148.0));
+    }
+    let words = format!("{memory}; {memory}; read line");
+    let mut takes = script(folder.path(), "takes", &words, 60);
+    for _ in 0..2 {
+        assert_eq!(takes.run(&case()).kind, "memory");
+    }
     let real = Path::new(env!("CARGO_BIN_EXE_tandem-campaign"));
     let report =
         Worker::new(real, &folder.path().join("work"), Duration::from_mins(2)).run(&case());
