@@ -178,3 +178,130 @@ pub fn to_chord<const L: usize>(point: &Lanes<L>, a: &Lanes<L>, b: &Lanes<L>) ->
     let across: Lanes<L> = each(|l| way[l] - along * chord[l]);
     dot(&across, &across)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::route::Chord;
+    use crate::window::Piece;
+    use tandem_rig::Random;
+
+    /// Chords of 1 to 2 mm one after the other that turn by up to `turn_rad`.
+    fn path(random: &mut Random, turn_rad: f64, tolerance: f64) -> Vec<Chord<2>> {
+        let (mut start, mut s, mut heading) = ([0.0; 2], 0.0, 0.0_f64);
+        let mut chords = vec![];
+        for _ in 0..3 {
+            let (length, direction) = (random.between(1.0, 2.0), [heading.cos(), heading.sin()]);
+            chords.push(Chord {
+                start,
+                direction,
+                s,
+                length,
+                feed: 10.0,
+                tolerance,
+                speed: 10.0,
+                turn_s: 0.1,
+                turn: 0.0,
+            });
+            start = plus(&start, length, &direction);
+            (s, heading) = (s + length, heading + random.between(-turn_rad, turn_rad));
+        }
+        chords
+    }
+
+    /// What is said of the distance of the motion from the path, as the checker asks for it: as a share of what is allowed.
+    fn said(run: &Run<'_, 2>, window: &Window<2>) -> f64 {
+        let end_s = window.pieces[0].duration_s;
+        let acceleration = |n: u32| window.state(end_s * f64::from(n) / 1000.0)[2];
+        let most = (0..=1000)
+            .map(|n| dot(&acceleration(n), &acceleration(n)))
+            .fold(0.0, larger);
+        let bulge = most.sqrt() * end_s * end_s / 8.0;
+        let last = run.chords.len() - 1;
+        let places = (
+            beside(run, 0, &window.state(0.0)[0]),
+            beside(run, last, &window.state(end_s)[0]),
+        );
+        let (from, to) = (&places.0, &places.1);
+        let between = stretch(run, from, to, bulge);
+        if between > 1.0 {
+            closer(run, window, [0.0, end_s], (from, to), bulge, HALVINGS)
+        } else {
+            larger(between, larger(from.share, to.share))
+        }
+    }
+
+    /// The largest distance of the motion from the nearest chord, as a share of what is allowed.
+    fn reached(run: &Run<'_, 2>, window: &Window<2>) -> f64 {
+        let end_s = window.pieces[0].duration_s;
+        let off = |n: u32| {
+            let at = window.state(end_s * f64::from(n) / 2000.0)[0];
+            let to = |chord: &Chord<2>| to_chord(&at, &chord.start, &chord.at(chord.end()));
+            run.chords.iter().map(to).fold(f64::INFINITY, f64::min)
+        };
+        let most = (0..=2000).map(off).fold(0.0, f64::max);
+        most.sqrt() / (ALLOWED * run.chords[0].tolerance)
+    }
+
+    fn open<'a>(chords: &'a [Chord<2>]) -> Run<'a, 2> {
+        Run {
+            chords,
+            closed: false,
+            rotary: false,
+            rapid: false,
+        }
+    }
+
+    fn window(piece: Piece<2>) -> Window<2> {
+        let mut window = Window::new();
+        window.pieces.push(piece);
+        window
+    }
+
+    #[test]
+    fn a_motion_beyond_the_tolerance_is_never_passed_and_one_well_within_it_is() {
+        let mut random = Random::from_the_clock();
+        let mut counts = [0; 2];
+        for _ in 0..400 {
+            let (turn_rad, tolerance) = (random.length(1e-3, 1.2), random.length(0.01, 1.0));
+            let chords = path(&mut random, turn_rad, tolerance);
+            let run = open(&chords);
+            let (first, last) = (&chords[0], &chords[2]);
+            let speed = random.between(3.0, 6.0);
+            let state =
+                |at: Lanes<2>, direction: Lanes<2>| [at, each(|l| speed * direction[l]), [0.0; 2]];
+            let from = state(first.start, first.direction);
+            let to = state(last.at(last.end()), last.direction);
+            let window = window(Piece::between(&from, &to, 0.0, run.end() / speed));
+            let (said, reached) = (said(&run, &window), reached(&run, &window));
+            if reached > 1.0 {
+                assert!(said > 1.0, "{said} is said of {reached}: {chords:?}");
+                counts[0] += 1;
+            } else if reached < 0.4 {
+                assert!(said <= 1.0, "{said} is said of {reached}: {chords:?}");
+                counts[1] += 1;
+            }
+        }
+        assert!(counts.iter().all(|count| *count > 20), "{counts:?}");
+    }
+
+    #[test]
+    fn a_motion_that_goes_back_on_its_chord_by_more_than_the_tolerance_is_not_passed() {
+        let mut random = Random::new(1);
+        for (back, passes) in [(0.05, true), (3.0, false)] {
+            for tolerance in [0.01, 0.1] {
+                let chords = path(&mut random, 0.0, tolerance);
+                let run = open(&chords);
+                let at = chords[1].at(chords[1].s + 0.9);
+                let place = |back: f64| {
+                    let point = plus(&at, -back, &chords[1].direction);
+                    beside(&run, 1, &point)
+                };
+                let goes_back = turns_back(&run, &place(0.0), &place(back * tolerance));
+                assert_eq!(!goes_back, passes, "{back} times {tolerance} mm");
+                let goes_on = turns_back(&run, &place(back * tolerance), &place(0.0));
+                assert!(!goes_on);
+            }
+        }
+    }
+}

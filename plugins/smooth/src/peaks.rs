@@ -283,6 +283,40 @@ mod tests {
         );
     }
 
+    /// On a diagonal that bends: what turning takes of an axis is not left for its stop, and never more than all of it.
+    #[test]
+    fn what_turning_takes_of_an_axis_is_not_left_for_its_stop() {
+        let axis = tandem_sdk::AxisLimits {
+            min_mm: -1.0,
+            max_mm: 1.0,
+            feed_mm_per_s: 10.0,
+            rapid_mm_per_s: 10.0,
+            acceleration_mm_per_s2: 100.0,
+            jerk_mm_per_s3: 1000.0,
+            speed_difference_mm_per_s: 0.0,
+        };
+        let frame = Frame::<2>::new(&tandem_rig::context(&[axis; 2], 1e-3));
+        let stops = |v: &Lanes<2>, a: &Lanes<2>| {
+            let mut stop = Stop::default();
+            leave(&mut stop, &frame, v, a, dot(v, v).sqrt());
+            stop.time_s
+        };
+        // Along the path nothing is taken, across it from the axis that it slows down: it stops with what is left.
+        for (a, left) in [
+            ([0.0, 0.0], 100.0),
+            ([30.0, 30.0], 100.0),
+            ([30.0, -30.0], 70.0),
+            ([-30.0, 30.0], 70.0),
+            ([60.0, 0.0], 70.0),
+            ([300.0, -300.0], 2.0),
+        ] {
+            for sign in [1.0, -1.0] {
+                let time_s = stops(&[5.0 * sign, 5.0 * sign], &a.map(|a| a * sign));
+                assert!((time_s - 5.0 / left).abs() < 1e-9, "{a:?}: {time_s} s");
+            }
+        }
+    }
+
     #[test]
     fn nothing_that_a_piece_reaches_is_above_what_is_said_of_it() {
         let mut random = Random::new(1);
