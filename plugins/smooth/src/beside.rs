@@ -285,6 +285,24 @@ mod tests {
         assert!(counts.iter().all(|count| *count > 20), "{counts:?}");
     }
 
+    /// Over a right angle: the corner stands off the line between places 0.3 mm before it and 0.8 mm behind it by the height of that triangle.
+    #[test]
+    fn a_corner_between_two_places_counts_as_far_as_it_stands_off_the_line_between_them() {
+        let mut chords = path(&mut Random::new(1), 0.0, 2.0);
+        let corner = chords[1].start;
+        chords[1].direction = [-chords[0].direction[1], chords[0].direction[0]];
+        let run = open(&chords);
+        let before = beside(&run, 0, &chords[0].at(chords[0].end() - 0.3));
+        let behind = beside(&run, 1, &plus(&corner, 0.8, &chords[1].direction));
+        for (a, b) in [(&before, &behind), (&behind, &before)] {
+            let share = stretch(&run, a, b, 0.1);
+            let expected = (0.3 * 0.8 / 0.3_f64.hypot(0.8) + 0.1) / (ALLOWED * 2.0);
+            assert!((share - expected).abs() < 1e-9, "{share}, not {expected}");
+        }
+        let same = stretch(&run, &before, &before, 0.1);
+        assert!((same - 0.1 / (ALLOWED * 2.0)).abs() < 1e-9, "{same}");
+    }
+
     #[test]
     fn a_motion_that_goes_back_on_its_chord_by_more_than_the_tolerance_is_not_passed() {
         let mut random = Random::new(1);
