@@ -47,8 +47,8 @@ pub fn profile(length: f64, feed: f64, acceleration: f64, jerk: f64) -> Pieces {
 pub struct Plan {
     pieces: Pieces,
     feed: f64,
-    /// From this time on the programmed feed is this share of it.
-    slower: (f64, f64),
+    /// From this time on the second line is driven, whose feed is this share of that of the first.
+    next_line: (f64, f64),
     path: Box<dyn Fn(f64) -> [f64; 2]>,
 }
 
@@ -57,15 +57,15 @@ impl Plan {
         Self {
             pieces,
             feed,
-            slower: (f64::INFINITY, 1.0),
+            next_line: (f64::INFINITY, 1.0),
             path: Box::new(path),
         }
     }
 
-    /// The same motion, of which the program asks for less from `from_s` on: `share` of the feed.
-    pub fn with_lower_feed(self, from_s: f64, share: f64) -> Self {
+    /// The same motion, which from `from_s` on is that of a second line, with `share` of the feed.
+    pub fn with_next_line(self, from_s: f64, share: f64) -> Self {
         Self {
-            slower: (from_s, share),
+            next_line: (from_s, share),
             ..self
         }
     }
@@ -134,8 +134,9 @@ impl Plan {
         segment.flags = SegmentFlags::default();
         (segment.order, segment.line) = (3, 1);
         segment.feed_mm_per_s = self.feed;
-        if from + 1e-9 >= self.slower.0 {
-            segment.feed_mm_per_s *= self.slower.1;
+        if from + 1e-9 >= self.next_line.0 {
+            segment.line = 2;
+            segment.feed_mm_per_s *= self.next_line.1;
         }
         segment.stop_deceleration_mm_per_s2 = 500.0;
         segment

@@ -129,7 +129,7 @@ fn a_lower_feed_ahead_is_kept_from_its_place_on_and_slows_nothing_long_before() 
     let middle_s = pieces.iter().map(|(_, duration)| duration).sum::<f64>() / 2.0;
     // A segment begins every 4 ms.
     let from_s = 4e-3 * (middle_s / 4e-3).round();
-    let plan = Plan::new(pieces, planned, |s| [0.8 * s, 0.6 * s]).with_lower_feed(from_s, share);
+    let plan = Plan::new(pieces, planned, |s| [0.8 * s, 0.6 * s]).with_next_line(from_s, share);
     let place_mm = line_mm / 2.0 + planned * (from_s - middle_s);
     let done = Machine::planned_at(&plan, 2.0).run_to_end();
     done.assert_kept("a lower feed ahead");
