@@ -45,7 +45,8 @@ pub const FEED_WAY_PERIODS: [f64; 2] = [64.0, 2560.0];
 pub const FEED_WAY_SINGLE_PERIODS: u32 = 48;
 
 /// Order 3: share of the limits of jerk and acceleration that such longer steps count on: they are looked at nowhere between
-/// their points.
+/// their points. With half of it lowering the rate to a feed takes more than 1.3 times as long as it must (the tests of
+/// `way_below.rs`).
 pub const FEED_WAY_LIMIT_SHARE: f64 = 0.95;
 
 /// Order 3: steps on such ways that are tried in a fine period, all together: the work of a period is bounded.
@@ -85,10 +86,12 @@ pub const BRAKING_PERIODS: f64 = 2.0;
 pub const SETTLING_PERIODS: f64 = 10.0;
 
 /// Order 3: share of the path jerk that a stop at the end of a line counts on where the plan turns or changes its speed, and
-/// elsewhere.
+/// elsewhere. From 80 mm/s on a straight line the stop begins 3 % before it has to; with half of the second share 16 %,
+/// and with twice as much too late (`core/fine/tests/suite/single_block.rs`).
 pub const LINE_END_JERK_SHARES: [f64; 2] = [0.6, 0.9];
 
 /// Order 3: fine periods at the present speed by which a stop at the end of a line is to end before it.
+/// In that experiment 1, 2 and 4 rest 0.26, 0.42 and 0.64 µm before the end, and begin 2, 3 and 5 % before they have to.
 pub const LINE_END_PERIODS: f64 = 2.0;
 
 /// Order 3: share of the path jerk that bringing the rise of the speed to nothing, near the feed, counts on: in a period in

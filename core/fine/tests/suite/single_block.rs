@@ -80,7 +80,7 @@ fn with_a_jerk_limit_the_machine_keeps_its_feed_until_the_stop_for_the_end_of_it
     let at_feed = speeds.iter().rposition(|speed| *speed > 0.999 * feed);
     let left_mm = place_mm - places[at_feed.expect("its feed is reached")];
     assert!(
-        (way_mm..1.2 * way_mm).contains(&left_mm),
+        (way_mm..1.1 * way_mm).contains(&left_mm),
         "it begins to stop {left_mm} mm before the end, of {way_mm} mm that it takes"
     );
 }
