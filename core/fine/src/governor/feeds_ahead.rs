@@ -26,8 +26,10 @@ const PIECES: usize = 96;
 const LONGER: f64 = 0.05;
 /// Share by which the path speed changes in a piece where it is beyond the feed.
 const FASTER: f64 = 0.1;
-/// Share of a period that such a piece is long at least.
+/// Share of what passes in a period at the ratio asked for that such a piece is long at least.
 const SHORTEST_PERIODS: f64 = 0.125;
+/// Lowest ratio that is told from none there: pieces get on.
+const LEAST_RATIO: f64 = 1e-3;
 /// w of the highest rate.
 const MOST: f64 = 0.5;
 
@@ -88,7 +90,7 @@ impl Governor {
         let feeds = Feeds { ratio, period_s };
         while let Some((segment, from_s)) = place.segment().filter(|_| count < PIECES) {
             let longest_s = (LONGER * offset_s).max(self.period_s);
-            let shortest_s = SHORTEST_PERIODS * self.period_s;
+            let shortest_s = SHORTEST_PERIODS * ratio.clamp(LEAST_RATIO, 1.0) * self.period_s;
             let piece_s = place.stretch_s(
                 longest_s.min(feeds.changing_s(segment, from_s, longest_s).max(shortest_s)),
             );
@@ -206,7 +208,12 @@ impl Feeds {
             .or_else(|| tangent(piece_s))
             .or_else(|| tangent(0.0))
             .unwrap_or(ends);
-        [0, 1].map(|end| ends[end].min(line[end]).max(0.0))
+        // Where the speed changes many times over, the tangent would meet nothing: there the lower end counts all along.
+        let least = ends[0].min(ends[1]);
+        if line[0].min(line[1]) < 0.5 * least {
+            return [least; 2];
+        }
+        [0, 1].map(|end| ends[end].min(line[end]))
     }
 
     /// w at which the feed is kept at local time `t_s` of `segment`, and no more than the greatest.
@@ -258,6 +265,34 @@ mod tests {
         segment.path = [0.0, from, faster, 0.0, 0.0, 0.0];
         segment.feed_mm_per_s = from;
         segment
+    }
+
+    /// From rest to a hundred times the feed asked for within a few pieces: the rate is low, and not nothing.
+    #[test]
+    fn a_ratio_near_nothing_leaves_a_rate() {
+        for ratio in [0.1, 0.01, 0.001, 1e-4] {
+            let mut segment = Segment::rest(&AxisVector::ZERO, 0.02);
+            segment.coefficients[0] = [0.0, 0.0, 1000.0, 0.0, 0.0, 0.0];
+            segment.path = segment.coefficients[0];
+            segment.feed_mm_per_s = 40.0;
+            let mut governor = Governor::new(&limits([2000.0; 2]), 2, 0.002);
+            for from_s in [0.0, 1e-6, 1e-4, 1e-3] {
+                let plan = PlanAhead::new(&segment, [&[], &[]], TWO_LINEAR);
+                governor.look_ahead(plan.begin(from_s), ratio);
+                for offset_s in [0.0, 1e-4, 1e-3, 0.015] {
+                    let rate = governor.rate_in_time(offset_s);
+                    assert!(
+                        rate > 0.25 * ratio,
+                        "{rate} for {ratio} at {from_s} s + {offset_s} s"
+                    );
+                }
+            }
+            // At none there is no rate, and an end to looking.
+            governor.look_ahead(
+                PlanAhead::new(&segment, [&[], &[]], TWO_LINEAR).begin(0.0),
+                0.0,
+            );
+        }
     }
 
     proptest! {
