@@ -516,13 +516,6 @@ impl Fit<'_> {
         let square = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>();
         let mut damping = 1e-2;
         'steps: for _ in 0..MOST_STEPS {
-            if std::env::var_os("DBG").is_some() {
-                eprintln!(
-                    "near {:.5} {}",
-                    square(&here),
-                    form.planned(&logs).constants()
-                );
-            }
             let mut jacobian = DMatrix::zeros(here.len(), logs.len());
             for index in 0..logs.len() {
                 let mut moved = logs.clone();
