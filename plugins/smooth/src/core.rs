@@ -14,7 +14,7 @@ use crate::route::{Item, Route};
 use crate::window::{Piece, State, Window};
 
 /// Part of a window in which it may be left for the next.
-const COMMIT: (f64, f64) = (0.42, 0.70);
+const COMMIT: (f64, f64) = (0.42, 0.80);
 /// Speeds that count as equal when the place to leave is chosen.
 const EQUAL: f64 = 0.995;
 /// What a refused plan moves that place by, as a share of the window.

@@ -31,6 +31,11 @@ pub struct Frame<const L: usize> {
 }
 
 impl<const L: usize> Frame<L> {
+    /// The largest of a limit of the axes.
+    pub fn largest(&self, limit: &Lanes<L>) -> f64 {
+        limit[..self.count].iter().copied().fold(0.0, f64::max)
+    }
+
     /// The frame of a machine with at most `L` axes, whose joints that are sums of axes are kept by narrower limits of the axes.
     pub fn new(machine: &PlannerContext) -> Self {
         let context = &machine.axis_by_axis();

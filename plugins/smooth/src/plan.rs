@@ -18,7 +18,7 @@ const JERK_SHARE: f64 = 0.995;
 const ACCELERATION_SHARE: f64 = 0.985;
 const FEED_SHARE: f64 = 0.9995;
 /// Gain of the last round that asks for another, and how many there may be.
-const MUCH: f64 = 0.01;
+const MUCH: f64 = 0.03;
 const EXTRA: usize = 2;
 /// Violation of a row, as a share of its limit, beyond which there is no rate.
 const INFEASIBLE: f64 = 0.004;
@@ -45,7 +45,7 @@ pub struct Tuning {
     pub step_s: f64,
     /// Time of a window, s.
     pub window_s: f64,
-    /// Share of the boxes that is used.
+    /// Share of the boxes that is used where little lies between two samples.
     pub box_share: f64,
     /// Rounds of a window in motion; one from rest has twice as many.
     pub rounds: usize,
@@ -59,35 +59,31 @@ const STEP_SHARE: f64 = 0.76;
 const ROUND_S: f64 = 0.25e-3;
 /// Shortest and longest step that is taken by itself, s.
 const STEPS_S: (f64, f64) = (1.5e-3, 12e-3);
+/// Share of the most that acceleration adds between two samples that boxes leave room for, and the least share of them that is
+/// left: few motions use all of the acceleration across the path.
+const BETWEEN: f64 = 0.2;
+const LEAST: f64 = 0.8;
 /// Steps of a window, without those of the stop at its end.
 const MAX_STEPS: f64 = 300.0;
 
 impl Tuning {
-    /// Step of the grid for a window on `run`, s: where none is stated, a share of the time in which an axis can go the
-    /// tolerance at its limits, which is how long the motion takes around a feature of the path.
-    fn step_s<const L: usize>(
-        &self,
-        run: &Run<'_, L>,
-        frame: &Frame<L>,
-        start: &Start<'_, L>,
-    ) -> f64 {
+    /// Step of the grid for a window whose least tolerance is `tolerance`, s: where none is stated, a share of the time in which
+    /// an axis can go the tolerance at its limits, which is how long the motion takes around a feature of the path.
+    fn step_s<const L: usize>(&self, frame: &Frame<L>, tolerance: f64) -> f64 {
         if self.step_s > 0.0 {
             return self.step_s;
         }
-        let mut way = 0.0;
-        let mut tolerance = f64::INFINITY;
-        for chord in &run.chords[run.chord_at(start.s, 0)..] {
-            if chord.s > start.end || way > start.window_s {
-                break;
-            }
-            tolerance = chord.tolerance.min(tolerance);
-            way += chord.length / chord.speed.max(1e-9);
-        }
-        let largest = |of: &Lanes<L>| of[..frame.count].iter().copied().fold(0.0, f64::max);
-        let by_jerk_s = (tolerance / largest(&frame.jerk)).cbrt();
-        let by_acceleration_s = (tolerance / largest(&frame.acceleration)).sqrt();
+        let by_jerk_s = (tolerance / frame.largest(&frame.jerk)).cbrt();
+        let by_acceleration_s = (tolerance / frame.largest(&frame.acceleration)).sqrt();
         let step_s = STEP_SHARE * by_jerk_s.max(by_acceleration_s);
         (ROUND_S * (step_s / ROUND_S).round()).clamp(STEPS_S.0, STEPS_S.1)
+    }
+
+    /// Share of the boxes of such a window: what the motion does between two samples counts as much as how far these are off.
+    fn share<const L: usize>(&self, frame: &Frame<L>, tolerance: f64) -> f64 {
+        let acceleration = frame.largest(&frame.acceleration);
+        let between = acceleration * frame.period_s * frame.period_s / 8.0;
+        self.box_share * (1.0 - BETWEEN * between / tolerance).max(LEAST)
     }
 }
 
@@ -104,6 +100,22 @@ pub struct Start<'a, const L: usize> {
     pub window_s: f64,
     /// The window that it goes on from, and when.
     pub old: Option<(&'a Window<L>, f64)>,
+}
+
+impl<const L: usize> Start<'_, L> {
+    /// The least tolerance of the path that the window may drive.
+    fn least_tolerance(&self, run: &Run<'_, L>) -> f64 {
+        let mut way_s = 0.0;
+        let mut tolerance = f64::INFINITY;
+        for chord in &run.chords[run.chord_at(self.s, 0)..] {
+            if chord.s > self.end || way_s > self.window_s {
+                break;
+            }
+            tolerance = chord.tolerance.min(tolerance);
+            way_s += chord.length / chord.speed.max(1e-9);
+        }
+        tolerance
+    }
 }
 
 /// Part of what is left of the window before whose timing is taken over.
@@ -145,8 +157,9 @@ pub struct Planning<const L: usize> {
     checker: Checker<L>,
     /// The last round found no rate that keeps all rows.
     infeasible: bool,
-    /// Step of the grid of the present window, s.
+    /// Step of the grid of the present window, s, and the share of its boxes that is used at first.
     step_s: f64,
+    box_share: f64,
 }
 
 /// What a round takes back.
@@ -178,6 +191,7 @@ impl<const L: usize> Planning<L> {
             checker: Checker::default(),
             infeasible: false,
             step_s: tuning.step_s,
+            box_share: tuning.box_share,
         }
     }
 
@@ -207,7 +221,9 @@ impl<const L: usize> Planning<L> {
     ) -> bool {
         self.effort.windows += 1;
         let counted = frame.counted(run.rotary);
-        self.step_s = self.tuning.step_s(run, frame, start);
+        let tolerance = start.least_tolerance(run);
+        self.step_s = self.tuning.step_s(frame, tolerance);
+        self.box_share = self.tuning.share(frame, tolerance);
         let reach = self.take_over(start);
         self.timing
             .make(run, frame, &counted, &reach, &mut self.marks);
@@ -223,7 +239,7 @@ impl<const L: usize> Planning<L> {
         let mut shares = Shares {
             jerk: JERK_SHARE,
             acceleration: ACCELERATION_SHARE,
-            boxes: self.tuning.box_share,
+            boxes: self.box_share,
             margin: 0.0,
             feed: FEED_SHARE,
             firm: 1.0,
@@ -336,7 +352,7 @@ impl<const L: usize> Planning<L> {
             begin: if start.resting {
                 shares.boxes
             } else {
-                shares.boxes.max(self.tuning.box_share)
+                shares.boxes.max(self.box_share)
             },
             travel,
             margin: shares.margin,

@@ -18,6 +18,13 @@ const PART: f64 = 0.1;
 pub const FINE_S: f64 = 4e-3;
 /// Distance below which vertices that are not sharp are no nodes of their own.
 const SHORTEST: f64 = 0.02;
+/// Sagitta of a chord, as a share of the tolerance, up to which a motion beside the vertices does not see them.
+const SMOOTHED: f64 = 0.9;
+/// Time that the motion takes for a chord beyond that, as a multiple of that in which jerk goes half of what is beyond.
+const SCALLOP: f64 = 4.2;
+/// Share of the jerk by which speed is built up along the path: on a way from one speed to another the acceleration comes and
+/// goes, and the axes have their turns to take beside it.
+const RAMP: f64 = 0.35;
 /// Factor from one speed tried to the next.
 const SLOWER: f64 = 0.9;
 
@@ -200,6 +207,8 @@ impl Timing {
             let speed = feed(chord, counted).min(along(&limits, &chord.direction));
             let jerk = along(&frame.jerk, &chord.direction);
             let tolerance = chord.tolerance;
+            let next = run.chords.get(looker.at + 1);
+            let speed = speed.min(polygon_speed(chord, next, jerk));
             let corner = tolerance / frame.jerk[0].min(jerk);
             if corner != last_corner.0 {
                 last_corner = (corner, (6.0 * corner).cbrt());
@@ -235,6 +244,21 @@ impl Timing {
             let longest = (apart_s * node.speed).clamp(GRADED.0, LONGEST);
             s = next_node(run, &looker, reach, s, longest, &mut ahead, &mut grown);
         }
+    }
+}
+
+/// The speed at which the motion follows a polygon whose chords stand off the curve through its vertices by more than the
+/// tolerance: across the path it goes to and fro once a chord, and the time for that goes by the third root of how far. Chords that
+/// are longer than the way in which a corner is taken are not driven any faster than its [`cap`].
+#[inline(always)]
+fn polygon_speed<const L: usize>(chord: &Chord<L>, next: Option<&Chord<L>>, jerk: f64) -> f64 {
+    let turn = next.map_or(0.0, |next| next.turn.min(chord.turn));
+    let sagitta = turn * chord.length / 8.0;
+    let over = (sagitta - SMOOTHED * chord.tolerance) / 2.0;
+    if over > 0.0 {
+        chord.length / (SCALLOP * (over / jerk).cbrt())
+    } else {
+        f64::INFINITY
     }
 }
 
@@ -307,11 +331,11 @@ fn reached(from: &Node, cap: f64, way: f64) -> f64 {
     }
 }
 
-/// The speed gained from a node over `way`: the exact jerk ramp from rest, and 0.8 of the acceleration.
+/// The speed gained from a node over `way`: the jerk ramp from rest at a share of the jerk, and 0.8 of the acceleration.
 #[inline(always)]
 fn gain(from: &Node, way: f64) -> f64 {
     let v = from.speed;
-    let ramp = v * v.sqrt() + 3.0 * (from.jerk / 2.0).sqrt() * way;
+    let ramp = v * v.sqrt() + 3.0 * (RAMP * from.jerk / 2.0).sqrt() * way;
     (ramp * ramp)
         .cbrt()
         .min((v * v + 1.6 * from.acceleration * way).sqrt())

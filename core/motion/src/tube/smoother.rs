@@ -6,9 +6,12 @@ use crate::in_wide_instructions;
 use crate::lanes::{Lanes, each, larger, largest, smaller};
 
 /// Iterations at most.
-const ITERATIONS: usize = 14;
+const ITERATIONS: usize = 24;
 /// Mean complementarity at which a solution is good enough.
 const ENOUGH: f64 = 2e-3;
+/// Least complementarity that is aimed at, as a share of that: what is there already waits for the other lanes, whose boxes may be
+/// harder to meet.
+const FLOOR: f64 = 0.1;
 /// Violation of a box, as a share of its half width, that is as good as none.
 const FEASIBLE: f64 = 0.02;
 /// How near to its bound a step may go.
@@ -117,7 +120,7 @@ impl<const L: usize> Smoother<L> {
             violation: f64::INFINITY,
         };
         loop {
-            let target = each(|l| shrink[l] * gap[l]);
+            let target = each(|l| larger(shrink[l] * gap[l], FLOOR * ENOUGH));
             status.violation = self.assemble(spline, &target);
             let good = largest(&gap) < ENOUGH && status.violation < FEASIBLE;
             if good || status.iterations == ITERATIONS {
@@ -127,7 +130,7 @@ impl<const L: usize> Smoother<L> {
             banded::solve(&mut self.matrix[free.clone()], &mut self.step[free]);
             let length;
             (length, gap) = self.advance(spline, &target);
-            shrink = each(|l| if length[l] > 0.8 { 0.03 } else { 0.4 });
+            shrink = length.map(shrink_after);
             status.iterations += 1;
         }
     }
@@ -304,6 +307,18 @@ impl<const L: usize> Smoother<L> {
             *point = each(|l| point[l] + length[l] * step[l]);
         }
         (length, self.mean(&products))
+    }
+}
+
+/// What the complementarity is to shrink by after a step of this length. Where steps get stuck some slacks and multipliers are much
+/// nearer to zero than others: it is to grow again, which brings them back among them.
+#[inline(always)]
+fn shrink_after(length: f64) -> f64 {
+    match length {
+        l if l > 0.8 => 0.03,
+        l if l > 0.4 => 0.4,
+        l if l > 0.1 => 0.8,
+        _ => 4.0,
     }
 }
 
