@@ -243,7 +243,7 @@ mod tests {
         most.sqrt() / (ALLOWED * run.chords[0].tolerance)
     }
 
-    fn open<'a>(chords: &'a [Chord<2>]) -> Run<'a, 2> {
+    fn open(chords: &[Chord<2>]) -> Run<'_, 2> {
         Run {
             chords,
             closed: false,

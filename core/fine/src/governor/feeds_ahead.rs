@@ -201,7 +201,8 @@ impl Feeds {
             let w = self.highest(segment, from_s + at_s);
             let [speed, acceleration, _] = derivatives(&segment.path, from_s + at_s);
             let slope = -2.0 * w * acceleration / speed;
-            (w < MOST).then(|| [w - slope * at_s, w + slope * (piece_s - at_s)])
+            let of_piece = [w - slope * at_s, w + slope * (piece_s - at_s)];
+            (w < MOST).then_some(of_piece)
         };
         // Where the middle is below the feed, an end is at the most that is allowed.
         let line = tangent(piece_s / 2.0)
