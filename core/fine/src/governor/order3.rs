@@ -389,7 +389,7 @@ impl Governor {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::plan_ahead::{Ahead, TWO_LINEAR};
     use proptest::prelude::*;
@@ -397,7 +397,7 @@ mod tests {
 
     const PERIOD_S: f64 = 0.001;
 
-    fn limits(acceleration: f64, jerk: f64) -> [AxisLimits; MAX_AXES] {
+    pub fn limits(acceleration: f64, jerk: f64) -> [AxisLimits; MAX_AXES] {
         [AxisLimits {
             min_mm: -1000.0,
             max_mm: 1000.0,

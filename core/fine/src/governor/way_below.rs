@@ -334,7 +334,7 @@ fn periods_of_step(passed: u32) -> u32 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Goal, Governor};
+    use super::super::{Goal, Governor, order3};
     use super::*;
     use crate::plan_ahead::{Ahead, TWO_LINEAR};
     use crate::steps::Recent;
@@ -343,16 +343,7 @@ mod tests {
 
     /// X is slower than Y.
     fn limits(acceleration: f64, slower: f64, jerk: f64) -> [AxisLimits; MAX_AXES] {
-        let axis = AxisLimits {
-            min_mm: -1000.0,
-            max_mm: 1000.0,
-            feed_mm_per_s: 1000.0,
-            rapid_mm_per_s: 1000.0,
-            acceleration_mm_per_s2: acceleration,
-            jerk_mm_per_s3: jerk,
-            speed_difference_mm_per_s: 0.0,
-        };
-        let mut limits = [axis; MAX_AXES];
+        let mut limits = order3::tests::limits(acceleration, jerk);
         limits[0].acceleration_mm_per_s2 *= slower;
         limits[0].jerk_mm_per_s3 *= slower;
         limits
