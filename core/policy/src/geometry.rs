@@ -205,16 +205,9 @@ mod tests {
         }
     }
 
-    /// A parabola that rises and falls again: X goes on all the way, Y first forward and then back.
     #[test]
     fn the_shares_of_a_curve_are_those_of_all_its_places() {
-        let point = |x: f64, y: f64| AxisVector::from_slice(&[x, y, 0.0]);
-        let data = tandem_sdk::NurbsData {
-            degree: 2,
-            control_points: vec![point(0.0, 0.0), point(10.0, 10.0), point(20.0, 0.0)],
-            weights: vec![1.0; 3],
-            knots: vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0],
-        };
+        let data = crate::shape::tests::parabola(1);
         let block = Block {
             kind: BlockKind::Nurbs,
             ..Block::at(AxisVector::ZERO)

@@ -160,9 +160,25 @@ fn square(vector: &[f64; MAX_AXES]) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use tandem_sdk::NurbsData;
+
+    /// A parabola that rises and falls again: X goes on all the way, axis `across` first forward and then back, by as much at the ends.
+    /// Its curvature is largest in the middle: its second derivative of 40 over the square of its first one of 20.
+    pub fn parabola(across: usize) -> NurbsData {
+        let point = |x: f64, y: f64| {
+            let mut point = AxisVector::from_slice(&[x]);
+            point[across] = y;
+            point
+        };
+        NurbsData {
+            degree: 2,
+            control_points: vec![point(0.0, 0.0), point(10.0, 10.0), point(20.0, 0.0)],
+            weights: vec![1.0; 3],
+            knots: vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0],
+        }
+    }
 
     fn turn_rad(before: &Direction, after: &Direction) -> f64 {
         let mut turns = vec![];
@@ -220,16 +236,9 @@ mod tests {
         assert_eq!(square(&[1.0; MAX_AXES]), 8.0);
     }
 
-    /// A parabola is bent most in the middle: by its second derivative of 40 over the square of its first one of 20.
     #[test]
     fn the_curvature_of_a_curve_is_that_of_its_sharpest_place() {
-        let point = |x: f64, y: f64| AxisVector::from_slice(&[x, 0.0, y]);
-        let data = NurbsData {
-            degree: 2,
-            control_points: vec![point(0.0, 0.0), point(10.0, 10.0), point(20.0, 0.0)],
-            weights: vec![1.0; 3],
-            knots: vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0],
-        };
+        let data = parabola(2);
         let block = Block {
             kind: BlockKind::Nurbs,
             ..Block::at(AxisVector::ZERO)
