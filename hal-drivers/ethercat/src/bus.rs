@@ -675,14 +675,7 @@ fn merge(latches: &mut [tandem_sdk::Latch], count: usize, latch: tandem_sdk::Lat
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Numbers from 0 to below 1 that are the same for a seed.
-    fn drawn(state: &mut u64) -> f64 {
-        *state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (*state >> 11) as f64 / (1_u64 << 53) as f64
-    }
+    use tandem_rig::Random;
 
     fn drive(n: usize) -> String {
         format!(
@@ -696,9 +689,9 @@ mod tests {
     fn two_minutes_of_jitter_and_drift_leave_no_sync0_without_a_setpoint() {
         const JITTER_NS: f64 = 100_000.0;
         for seed in [1, 2] {
-            let mut random = seed;
+            let mut random = Random::new(seed);
             let drives: String = (0..3).map(drive).collect();
-            let clocks: String = [100.0, -100.0, (drawn(&mut random) - 0.5) * 200.0]
+            let clocks: String = [100.0, -100.0, (random.unit() - 0.5) * 200.0]
                 .map(|ppm| format!("[[emulated.devices]]\nkind = \"drive\"\ndrift_ppm = {ppm:?}\n"))
                 .concat();
             let text = format!("interface = \"emulated\"\nsync = \"dc\"\n{drives}{clocks}");
@@ -720,7 +713,7 @@ mod tests {
             let before = count(&mut bus);
             let mut worst_ns = 0;
             for _ in 0..120_000 {
-                let late_ns = drawn(&mut random) * JITTER_NS;
+                let late_ns = random.unit() * JITTER_NS;
                 bus.link.wait_until(bus.next_ns + late_ns as u64);
                 bus.exchange_at_once(&Setpoint::default());
                 bus.steer();

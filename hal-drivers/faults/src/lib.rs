@@ -8,7 +8,6 @@ mod entry;
 mod kind;
 mod nearest;
 mod options;
-mod random;
 mod schedule;
 #[cfg(test)]
 mod tests;

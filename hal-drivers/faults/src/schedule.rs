@@ -1,6 +1,6 @@
 //! Which exchanges a fault hits.
 
-use crate::random::Random;
+use tandem_random::Random;
 
 /// How often, within the window.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -84,7 +84,7 @@ mod tests {
             rate,
             periods,
         };
-        let mut schedule = Schedule::new(when, Random::new(seed, 0));
+        let mut schedule = Schedule::new(when, Random::of(seed, 0));
         (0..1000).filter(|tick| schedule.hits(*tick)).collect()
     }
 

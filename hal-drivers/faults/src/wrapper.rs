@@ -1,12 +1,12 @@
 //! The wrapper: a driver around a driver.
 
+use tandem_random::Random;
 use tandem_sdk::{
     Attached, Driver, DriverContext, DriverDescription, Feedback, Latch, MAX_LATCHES, PluginError,
     Setpoint, Words,
 };
 
 use crate::kind::{Kind, Line, freeze};
-use crate::random::Random;
 use crate::schedule::{Schedule, When};
 
 /// One entry of `[[faults.wrap]]`, checked.
@@ -36,7 +36,7 @@ pub struct Wrapper {
 impl Wrapper {
     /// Wraps `inner`, which is not open yet, as entry `index` of the list. Host; allocates.
     pub fn new(inner: Box<dyn Driver>, plan: Plan, seed: u64, index: u64) -> Self {
-        let random = Random::new(seed, index);
+        let random = Random::of(seed, index);
         let line = Line::new(if let Kind::Delay(periods) = plan.kind {
             periods
         } else {

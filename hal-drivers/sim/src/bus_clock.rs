@@ -1,10 +1,10 @@
 //! The clock of the bus: drives take their setpoint when it ticks, whatever the host's clock says.
 
 use serde::{Deserialize, Serialize};
+use tandem_random::Random;
 use tandem_sdk::PluginError;
 
 use crate::options::within;
-use crate::servo::Noise;
 
 /// How the clock of the bus goes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -29,7 +29,7 @@ pub(crate) struct BusClock {
     /// Fine period as the host's clock has it, ns.
     period_ns: f64,
     jitter_ns: f64,
-    noise: Noise,
+    noise: Random,
     /// The first tick on the host's clock, ns.
     first_ns: Option<i64>,
 }
@@ -37,7 +37,7 @@ pub(crate) struct BusClock {
 impl BusClock {
     pub fn new(options: &BusClockOptions, period_s: f64, seed: u64) -> Self {
         let period_ns = period_s * 1e9 / (1.0 + options.drift_ppm * 1e-6);
-        let noise = Noise::new(seed.wrapping_add(PHASE));
+        let noise = Random::new(seed.wrapping_add(PHASE));
         Self {
             period_ns,
             jitter_ns: options.jitter_us * 1e3,
@@ -50,7 +50,7 @@ impl BusClock {
     pub fn phase_ns(&mut self, now_ns: i64) -> i64 {
         let since_ns = (now_ns - *self.first_ns.get_or_insert(now_ns)) as f64;
         let ticks = (since_ns / self.period_ns).round();
-        let error_ns = self.jitter_ns * (2.0 * self.noise.uniform() - 1.0);
+        let error_ns = self.noise.between(-self.jitter_ns, self.jitter_ns);
         (since_ns - ticks * self.period_ns + error_ns).round() as i64
     }
 }

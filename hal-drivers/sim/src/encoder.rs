@@ -1,10 +1,10 @@
 //! What the encoders of the joints say: where they begin to count, their noise and their counts.
 
 use serde::{Deserialize, Serialize};
-use tandem_sdk::{Attached, AxisVector, MAX_AXES};
+use tandem_random::Random;
+use tandem_sdk::{Attached, AxisVector};
 
 use crate::options::Options;
-use crate::servo::Noise;
 
 /// What an encoder knows at power-on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -22,13 +22,13 @@ pub enum Encoder {
 pub(crate) struct Encoders {
     count_mm: f64,
     noise_mm: f64,
-    noise: Noise,
+    noise: Random,
 }
 
 impl Encoders {
     /// Those of checked options.
     pub fn new(options: &Options) -> Self {
-        let noise = Noise::new(options.seed.wrapping_add(NOISE));
+        let noise = Random::new(options.seed.wrapping_add(NOISE));
         Self {
             count_mm: options.encoder_count_mm,
             noise_mm: options.encoder_noise_mm,
@@ -63,10 +63,10 @@ pub(crate) struct PowerOn {
 impl PowerOn {
     /// The machine file has them at `start`, the options may have them elsewhere.
     pub fn new(options: &Options, start: &AxisVector) -> Self {
-        let mut spread = Noise::new(options.seed.wrapping_add(SPREAD));
+        let mut spread = Random::new(options.seed.wrapping_add(SPREAD));
         let stands = |joint: usize| {
             let place = options.start_mm.get(joint).copied().unwrap_or(start[joint]);
-            let share = 2.0 * spread.uniform() - 1.0;
+            let share = spread.between(-1.0, 1.0);
             if options.start_spread_mm == 0.0 {
                 place
             } else {
@@ -103,19 +103,15 @@ pub(crate) fn attached(encoder: Encoder, position: AxisVector) -> Attached {
 
 /// How far each joint stands from where its drive says: a seeded part of the option.
 fn unknown_start(options: &Options) -> AxisVector {
-    let mut state = options.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
-    AxisVector(std::array::from_fn::<_, MAX_AXES, _>(|_| {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        let share = (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0;
-        share * options.unknown_start_mm
-    }))
+    let mut random = Random::new(options.seed.wrapping_add(START));
+    let most_mm = options.unknown_start_mm;
+    AxisVector(std::array::from_fn(|_| random.between(-most_mm, most_mm)))
 }
 
 /// What makes rows of random numbers from one seed different ones.
 const NOISE: u64 = 0x656e_636f_6465_7273;
 const SPREAD: u64 = 0x7370_7265_6164_0000;
+const START: u64 = 0x7374_6172_7400_0000;
 
 #[cfg(test)]
 mod tests {

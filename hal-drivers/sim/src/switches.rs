@@ -1,5 +1,6 @@
 //! The simulated switches on the digital inputs: their edges, caught where they are, and their bounce.
 
+use tandem_random::Random;
 use tandem_sdk::{Arm, AxisVector, Latch, MAX_AXES, MAX_LATCHES};
 
 use crate::options::Options;
@@ -23,7 +24,7 @@ pub(crate) struct Switches {
     latching: bool,
     /// Bit per joint whose drive catches its position.
     catching: u32,
-    random: u64,
+    random: Random,
 }
 
 impl Switches {
@@ -58,12 +59,11 @@ impl Switches {
         } else {
             catching
         };
-        // A generator of this kind must not start at zero.
         Self {
             lines,
             latching: options.latches,
             catching,
-            random: options.seed.wrapping_mul(2).wrapping_add(1),
+            random: Random::new(options.seed),
         }
     }
 
@@ -104,7 +104,7 @@ impl Switches {
                 }
             }
             let shown = if line.bouncing > 0 {
-                random_bit(&mut self.random)
+                self.random.once_in(2)
             } else {
                 line.on
             };
@@ -127,12 +127,4 @@ fn caught(edge: Arm, joints: u32, mut position: AxisVector, before_s: f64) -> La
         before_s,
         position,
     }
-}
-
-/// The next bit of an xorshift generator.
-fn random_bit(state: &mut u64) -> bool {
-    *state ^= *state << 13;
-    *state ^= *state >> 7;
-    *state ^= *state << 17;
-    *state >> 63 == 1
 }

@@ -1,10 +1,10 @@
 //! The wire between driver and drives: frames that are lost, answers that are late, and the time that they take.
 
 use serde::{Deserialize, Serialize};
+use tandem_random::Random;
 use tandem_sdk::{Feedback, Latch, MAX_DELAY_PERIODS, MAX_DIGITAL, MAX_LATCHES, PluginError};
 
 use crate::options::{Options, refusal, within};
-use crate::servo::Noise;
 
 /// Which frames something happens to.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -46,7 +46,7 @@ impl Frames {
 #[derive(Clone, Debug)]
 struct Gate {
     frames: Frames,
-    noise: Noise,
+    random: Random,
     /// Periods that it still lasts.
     left: u32,
     /// The tick at which it began last: a tick that is sent again begins nothing.
@@ -57,14 +57,14 @@ impl Gate {
     fn new(frames: &Frames, seed: u64) -> Self {
         Self {
             frames: frames.clone(),
-            noise: Noise::new(seed),
+            random: Random::new(seed),
             left: 0,
             begun: None,
         }
     }
 
     fn hits(&mut self, tick: u64) -> bool {
-        let drawn = self.frames.probability > 0.0 && self.noise.uniform() < self.frames.probability;
+        let drawn = self.frames.probability > 0.0 && self.random.share() < self.frames.probability;
         if self.left > 0 {
             self.left -= 1;
             return true;

@@ -1,4 +1,5 @@
 //! Random numbers from a seed: `SplitMix64`, after Steele, Lea and Flood, "Fast splittable pseudorandom number generators".
+//! The simulations have the same in `tandem_random`; this crate is published with the SDK, and depends on nothing else.
 
 /// A generator.
 #[derive(Clone, Debug)]

@@ -1,6 +1,7 @@
 //! Random numbers from a seed.
 
-/// xorshift64*: the same program for the same seed everywhere.
+/// xorshift64*: the same program for the same seed everywhere. It is not the generator of the simulations, `tandem_random`, because
+/// the seeds of programs that pages and reports of the campaign name stand for these numbers.
 #[derive(Clone, Debug)]
 pub struct Random(u64);
 

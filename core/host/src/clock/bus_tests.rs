@@ -6,6 +6,8 @@
 use std::cell::Cell;
 use std::rc::Rc;
 
+use tandem_rig::Random;
+
 use super::{Body, PeriodClock, PhaseSteering, Timing, run, steered};
 
 /// Pulses of 120 s at 1 ms.
@@ -13,18 +15,9 @@ const PULSES: i64 = 120_000;
 /// How long the loop takes into step, s: drives are not enabled by then, so pulses before that may stay empty.
 const LOCK_S: f64 = 0.25;
 
-/// Numbers that are the same for a seed.
-struct Random(u64);
-
-impl Random {
-    /// From 0 up to `below`.
-    fn below(&mut self, below: i64) -> i64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        ((i128::from(self.0 >> 11) * i128::from(below)) >> 53) as i64
-    }
+/// From 0 up to `below`.
+fn up_to(random: &mut Random, below: i64) -> i64 {
+    random.below(below.unsigned_abs()).cast_signed()
 }
 
 /// What the computer does to the loop.
@@ -66,7 +59,7 @@ impl PeriodClock for Clock {
     fn sleep_until(&mut self, deadline_ns: i64) {
         self.sleeps += 1;
         let woken_ns = self.now.get().max(deadline_ns)
-            + self.random.below(self.computer.jitter_ns + 1)
+            + up_to(&mut self.random, self.computer.jitter_ns + 1)
             + self.computer.stall_ns(&self.computer.asleep, self.sleeps);
         self.latest_ns
             .set(self.latest_ns.get().max(woken_ns - deadline_ns));
@@ -104,7 +97,7 @@ impl Body for Bus {
 
     fn period(&mut self) {
         self.exchanges += 1;
-        let worked_ns = self.random.below(self.computer.work_ns + 1)
+        let worked_ns = up_to(&mut self.random, self.computer.work_ns + 1)
             + self
                 .computer
                 .stall_ns(&self.computer.at_work, self.exchanges);
@@ -144,11 +137,11 @@ impl Rig {
     /// A bus that drifts by `ppm` against the computer, its first pulse anywhere in a period.
     fn new(computer: &Computer, ppm: f64, seed: u64) -> Self {
         let (now, latest_ns) = (Rc::new(Cell::new(0)), Rc::default());
-        let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) + 1);
-        let first_ns = random.below(computer.period_ns) as f64;
+        let mut random = Random::new(seed);
+        let first_ns = up_to(&mut random, computer.period_ns) as f64;
         let clock = Clock {
             now: Rc::clone(&now),
-            random: Random(seed + 1000),
+            random: Random::new(seed + 1000),
             computer: computer.clone(),
             sleeps: 0,
             latest_ns: Rc::clone(&latest_ns),
@@ -306,10 +299,15 @@ fn half_and_twice_the_gains_hold_it_as_well() {
 #[test]
 fn what_stalls_is_counted_exactly_while_steered() {
     for seed in 0..8 {
-        let mut random = Random(seed + 77);
+        let mut random = Random::new(seed + 77);
         let mut stalls = |count: i64| -> Vec<(i64, i64)> {
             (1..=count)
-                .map(|stall| (1000 * stall + random.below(400), 1 + random.below(20)))
+                .map(|stall| {
+                    (
+                        1000 * stall + up_to(&mut random, 400),
+                        1 + up_to(&mut random, 20),
+                    )
+                })
                 .collect()
         };
         let computer = Computer {
@@ -325,7 +323,7 @@ fn what_stalls_is_counted_exactly_while_steered() {
             at_work,
             ..computer
         };
-        let ppm = random.below(201) as f64 - 100.0;
+        let ppm = up_to(&mut random, 201) as f64 - 100.0;
         let injected: i64 = computer
             .asleep
             .iter()

@@ -4,6 +4,7 @@ use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 
 use tandem_fine::{FaultKind, FineConfig, FineLoop};
+use tandem_rig::Random;
 use tandem_rings::{HostEnd, Queued, RoughEnd, Sizes, bridge};
 use tandem_sdk::{AxisLimits, AxisVector, Driver, DriverContext, Limits, Segment, SegmentFlags};
 
@@ -168,17 +169,16 @@ fn asleep_and_then_at_work_is_one_row() {
 #[test]
 fn every_mixture_of_stalls_is_counted() {
     // A fixed sequence of numbers that repeats late: no run differs from another.
-    let mut state = 1_u64;
-    let mut next = |below: u64| {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (state >> 33) % below
-    };
+    let mut random = Random::new(1);
     for _ in 0..200 {
         let mut some = || {
             (0..8)
-                .map(|_| (next(200) as usize + 1, next(5_000_000).cast_signed()))
+                .map(|_| {
+                    (
+                        random.below(200) as usize + 1,
+                        random.below(5_000_000).cast_signed(),
+                    )
+                })
                 .collect::<Vec<_>>()
         };
         let (asleep, mut at_work) = (some(), some());

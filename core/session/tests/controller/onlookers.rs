@@ -11,6 +11,7 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
+use tandem_rig::Random;
 use tandem_session::controller::NoKeeper;
 
 use crate::doors::{Client, NEVER, with_controller};
@@ -194,13 +195,8 @@ fn compared(pairs: &[[f64; 2]]) -> (f64, f64, f64) {
         (sums[1] + 1.0) / (sums[0] + 1.0)
     };
     let seen = ratio(&mut || false);
-    let mut random = 0x9e37_79b9_7f4a_7c15_u64;
-    let mut toss = || {
-        random ^= random << 13;
-        random ^= random >> 7;
-        random ^= random << 17;
-        random >> 63 == 1
-    };
+    let mut random = Random::new(1);
+    let mut toss = || random.below(2) == 1;
     let by_chance: Vec<f64> = (0..EXCHANGES).map(|_| ratio(&mut toss)).collect();
     let as_large = by_chance.iter().filter(|ratio| **ratio >= seen).count();
     let noticed = share_of(by_chance, 1.0 - CHANCE);

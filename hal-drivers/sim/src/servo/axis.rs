@@ -2,7 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use super::noise::Noise;
+use tandem_random::Random;
+
 use super::options::ServoOptions;
 
 /// Time between two plant steps is the step of the integration; the loops act once a fine period.
@@ -22,7 +23,7 @@ pub struct ServoAxis {
     integral_nm: f64,
     measured: Measured,
     period_s: f64,
-    noise: Noise,
+    noise: Random,
 }
 
 /// What the encoder says.
@@ -45,7 +46,7 @@ impl ServoAxis {
             integral_nm: 0.0,
             measured: Measured::default(),
             period_s,
-            noise: Noise::new(seed),
+            noise: Random::new(seed),
         };
         this.rest_at(angle_rad, 0.0);
         this

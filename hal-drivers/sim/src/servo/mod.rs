@@ -8,7 +8,6 @@ mod axis;
 mod cutting;
 mod friction;
 mod joints;
-mod noise;
 mod options;
 mod workpiece;
 
@@ -19,7 +18,6 @@ pub use options::{CuttingOptions, ServoOptions};
 pub use workpiece::{Profile, Random, Workpiece};
 
 pub(crate) use joints::ServoJoints;
-pub(crate) use noise::Noise;
 
 /// Step of the simulated plant, s.
 pub const PLANT_STEP_S: f64 = 1e-4;

@@ -4,8 +4,6 @@ use std::f64::consts::PI;
 
 use serde::{Deserialize, Serialize};
 
-use super::noise::Noise;
-
 /// Most sections of a random workpiece.
 const MAX_SECTIONS: usize = 10_000;
 
@@ -135,8 +133,8 @@ impl Random {
     }
 
     fn walls(&self, seed: u64) -> Vec<[f64; 2]> {
-        let mut noise = Noise::new(seed);
-        let mut between = |[low, high]: [f64; 2]| low + (high - low) * noise.uniform();
+        let mut random = tandem_random::Random::new(seed);
+        let mut between = |[low, high]: [f64; 2]| random.between(low, high);
         let mut at = self.start_mm;
         let mut walls = Vec::with_capacity(self.sections + 1);
         for _ in 0..self.sections {

@@ -91,13 +91,17 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("core/batch-nats", &["tandem-batch"]),
     ("plugins", &["tandem-motion", "tandem-sdk"]),
     // It reads a table of the machine file, and no hardware.
-    ("hal-drivers/faults", &["tandem-machine", "tandem-sdk"]),
+    ("hal-drivers/random", &[]),
+    (
+        "hal-drivers/faults",
+        &["tandem-machine", "tandem-random", "tandem-sdk"],
+    ),
     ("hal-drivers/ethercat-emulator", &[]),
     (
         "hal-drivers/ethercat",
         &["tandem-ethercat-emulator", "tandem-sdk"],
     ),
-    ("hal-drivers", &["tandem-sdk"]),
+    ("hal-drivers", &["tandem-random", "tandem-sdk"]),
     ("scripts", &[]),
     (
         "tests/campaign",
