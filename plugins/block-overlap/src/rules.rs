@@ -173,3 +173,40 @@ pub fn lesser(a: f64, b: f64) -> f64 {
 pub fn greater(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tandem_sdk::Limits;
+
+    /// X, Y, Z and the rotary A with a joint behind them that is a sum of axes: it has limits of motion and no place.
+    #[test]
+    fn the_rules_of_a_machine_are_those_of_its_axes() {
+        let accelerations = [1000.0, 2000.0, 500.0, 3000.0, 800.0];
+        let limits = accelerations.map(tandem_rig::axis);
+        let machine = PlannerContext {
+            limits: Limits::new(&limits).unwrap(),
+            ..tandem_rig::context(&limits[..4], 0.001)
+        };
+        let rules = Rules::new(&Options::default(), &machine);
+        assert_eq!(rules.linear, 0b0111);
+        assert_eq!(rules.axes, 5);
+        let lows = [-1e6, -1e6, -1e6, -1e6, f64::NEG_INFINITY];
+        assert_eq!(rules.travel_mm[0].0[..5], lows);
+        assert_eq!(rules.travel_mm[1].0[..5], lows.map(|low| -low));
+        assert_eq!(
+            rules.metric.0[..5],
+            [1.0, 1.0, 1.0, 180.0 / std::f64::consts::PI, 0.0]
+        );
+        for (axis, acceleration) in accelerations.into_iter().enumerate() {
+            let expected = 1.0 / (AIM * acceleration);
+            assert!((rules.per_acceleration[axis] / expected - 1.0).abs() < 1e-12);
+        }
+        // A chord between two ticks sags by a·t²/8 in every axis, in degrees in a rotary one.
+        let all = (1e6 + 4e6 + 0.25e6 + 9e6 * (180.0 / std::f64::consts::PI).powi(2)).sqrt();
+        assert!((rules.sag_mm / (AIM * all * 1e-6 / 8.0) - 1.0).abs() < 1e-12);
+        assert!((rules.weakest_mm_per_s2 - AIM * 500.0).abs() < 1e-9);
+        assert!((rules.on_tick_s(0.0123) - 0.012).abs() < 1e-12);
+        assert!((rules.on_tick_s(1e-6) - 0.001).abs() < 1e-12);
+    }
+}

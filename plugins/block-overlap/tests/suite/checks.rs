@@ -1,7 +1,8 @@
 //! What the planner refuses before anything moves.
 
 use tandem_block_overlap::{BlockOverlap, CornerControl, LimitMode, Options};
-use tandem_sdk::{AxisVector, Block, BlockKind, Planner, PlannerContext};
+use tandem_rig::Collected;
+use tandem_sdk::{Accepted, AxisVector, Block, BlockKind, Planner, PlannerContext};
 
 use crate::common::context;
 
@@ -63,4 +64,30 @@ fn a_planner_says_of_itself_what_its_options_give_up() {
     assert_eq!(described(kept.corner_control, kept.limits), (0, 0));
     assert_eq!(described(CornerControl::Off, kept.limits), (1, 0));
     assert_eq!(described(kept.corner_control, LimitMode::Off), (0, 1));
+}
+
+/// Blocks end within what is asked for, and what follows takes the rest and no more.
+#[test]
+fn no_more_motion_comes_than_is_asked_for() {
+    let machine = context(&[5000.0; 3], 0.001);
+    let mut planner = BlockOverlap::new(&Options::default(), &machine).unwrap();
+    let points: Vec<_> = (0..40)
+        .map(|n| AxisVector::from_slice(&[0.3 * f64::from(n), 0.3 * f64::from(n % 2), 0.0]))
+        .collect();
+    let mut collected = Collected::default();
+    let mut calls = 0;
+    let mut ask = |planner: &mut BlockOverlap| {
+        let advanced = planner.advance(0.007, &mut collected).unwrap();
+        assert!(advanced.duration_s < 0.007 + 1e-9, "{advanced:?}");
+        calls += 1;
+        advanced.done == 1
+    };
+    for block in tandem_rig::lines(&points, |_| 3000.0) {
+        while planner.accept(&block, None).unwrap() == Accepted::Full {
+            ask(&mut planner);
+        }
+    }
+    planner.finish();
+    while !ask(&mut planner) {}
+    assert!(calls > 40, "{calls}");
 }
