@@ -182,6 +182,7 @@ pub fn to_chord<const L: usize>(point: &Lanes<L>, a: &Lanes<L>, b: &Lanes<L>) ->
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::order::tests::open;
     use crate::route::Chord;
     use crate::window::Piece;
     use tandem_rig::Random;
@@ -241,15 +242,6 @@ mod tests {
         };
         let most = (0..=2000).map(off).fold(0.0, f64::max);
         most.sqrt() / (ALLOWED * run.chords[0].tolerance)
-    }
-
-    fn open(chords: &[Chord<2>]) -> Run<'_, 2> {
-        Run {
-            chords,
-            closed: false,
-            rotary: false,
-            rapid: false,
-        }
     }
 
     fn window(piece: Piece<2>) -> Window<2> {

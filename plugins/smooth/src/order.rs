@@ -157,13 +157,13 @@ fn within<const L: usize>(
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
 
     const TOLERANCE: f64 = 0.01;
 
     /// Lines through `points`.
-    fn lines(points: &[[f64; 2]]) -> Vec<Chord<2>> {
+    pub fn lines(points: &[[f64; 2]]) -> Vec<Chord<2>> {
         let mut s = 0.0;
         let chord = |pair: &[[f64; 2]]| {
             let way = minus(&pair[1], &pair[0]);
@@ -185,15 +185,20 @@ mod tests {
         points.windows(2).map(chord).collect()
     }
 
+    /// A run that may go on behind these chords.
+    pub fn open(chords: &[Chord<2>]) -> Run<'_, 2> {
+        Run {
+            chords,
+            closed: false,
+            rotary: false,
+            rapid: false,
+        }
+    }
+
     /// Whether samples at these points have places in order on the path.
     fn in_order(path: &[[f64; 2]], samples: &[[f64; 2]]) -> bool {
         let chords = lines(path);
-        let run = Run {
-            chords: &chords,
-            closed: true,
-            rotary: false,
-            rapid: false,
-        };
+        let run = open(&chords);
         Order::default().walk(&run, samples, 0, (0, run.end()))
     }
 

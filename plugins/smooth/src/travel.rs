@@ -162,3 +162,126 @@ impl<const L: usize> Travel<L> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::order::tests::{lines, open};
+    use std::sync::OnceLock;
+    use tandem_sdk::{AxisLimits, AxisVector, JointLanes, Limits};
+
+    /// X between ∓1 and Y between ∓100; with `joints` also X + Y between −5 and 1, and X − Y between ∓50.
+    fn travel(joints: bool) -> Travel<2> {
+        static LANES: OnceLock<JointLanes> = OnceLock::new();
+        let weights = [[1.0, 1.0], [1.0, -1.0]].map(|weights| AxisVector::from_slice(&weights));
+        let lanes = LANES.get_or_init(|| JointLanes::new(2, &weights).unwrap());
+        let limits = [[-1.0, 1.0], [-100.0, 100.0], [-5.0, 1.0], [-50.0, 50.0]];
+        let limits = limits.map(|[min_mm, max_mm]| AxisLimits {
+            min_mm,
+            max_mm,
+            ..tandem_rig::axis(1000.0)
+        });
+        let count = if joints { 4 } else { 2 };
+        let machine = PlannerContext {
+            limits: Limits::new(&limits[..count]).unwrap(),
+            joint_lanes: joints.then_some(lanes),
+            ..tandem_rig::context(&limits[..2], 1e-3)
+        };
+        Travel::new(&machine, &[1.0; 2])
+    }
+
+    fn assert_near(values: &[f64], expected: &[f64]) {
+        let off = values.iter().zip(expected).map(|(a, b)| (a - b).abs());
+        assert!(off.fold(0.0, f64::max) < 1e-12, "{values:?}, {expected:?}");
+    }
+
+    #[test]
+    fn a_position_is_beyond_the_end_that_it_is_furthest_behind() {
+        let beyond = |joints: bool, at: [f64; 2]| travel(joints).beyond(&at);
+        let found = [
+            beyond(false, [0.0, 0.0]),
+            beyond(false, [1.5, 0.0]),
+            beyond(false, [-1.25, 100.5]),
+            beyond(true, [0.0, -1.0]),
+            beyond(true, [0.9, 0.9]),
+            beyond(true, [1.4, -0.9]),
+            beyond(true, [-0.5, -5.5]),
+        ];
+        assert_near(&found, &[-1.0, 0.5, 0.5, -1.0, 0.8, 0.4, 1.0]);
+        // An end itself is not beyond itself, for all rounding.
+        assert!(beyond(false, [1.0 + f64::EPSILON, 0.0]) <= 0.0);
+    }
+
+    #[test]
+    fn a_path_is_near_an_end_that_its_tolerance_reaches() {
+        let around = |joints: bool, points: &[[f64; 2]], from: f64, to: f64| {
+            let mut chords = lines(points);
+            for chord in &mut chords {
+                chord.tolerance = 0.1;
+            }
+            travel(joints).around(&open(&chords), (from, to), &points[0])
+        };
+        let there = [[0.0, 0.0], [0.5, 0.0], [0.95, 0.0]];
+        assert!(around(false, &there, 0.0, 0.95).is_some());
+        assert!(around(false, &there, 0.0, 0.85).is_none());
+        assert!(around(false, &there.map(|[x, y]| [-x, y]), 0.0, 0.95).is_some());
+        assert!(around(false, &there.map(|[x, y]| [-x, y]), 0.0, 0.85).is_none());
+        // Where it comes to the end on its way, where it begins, and where it ends.
+        let over = [[0.0, 0.0], [0.95, 0.0], [0.0, 0.0]];
+        assert!(around(false, &over, 0.0, 1.9).is_some());
+        let back = [[0.95, 0.0], [0.5, 0.0], [0.0, 0.0]];
+        assert!(around(false, &back, 0.5, 0.95).is_some());
+        // Joints that are sums of axes take the tolerance in both.
+        assert!(around(true, &[[0.0, 0.0], [0.45, 0.45]], 0.0, 1.0).is_some());
+        assert!(around(true, &[[0.0, 0.0], [0.4, 0.4]], 0.0, 1.0).is_none());
+        assert!(around(true, &[[0.0, -2.0], [-0.4, -4.5]], 0.0, 9.0).is_some());
+        assert!(around(true, &[[0.0, -2.0], [-0.3, -4.5]], 0.0, 9.0).is_none());
+    }
+
+    #[test]
+    fn a_path_beyond_an_end_may_be_followed_there_and_no_further() {
+        let chords = lines(&[[0.8, 0.6], [1.2, 0.9], [0.8, 0.6]]);
+        let around = |joints: bool| {
+            let travel = travel(joints);
+            travel.around(&open(&chords), (0.0, 1.0), &chords[0].start)
+        };
+        let beyond = [false, true].map(|joints| {
+            let travel = around(joints).unwrap();
+            [
+                travel.beyond(&[1.2, 0.9]).max(0.0),
+                travel.beyond(&[1.3, 1.2]),
+            ]
+        });
+        assert_near(beyond.as_flattened(), &[0.0, 0.1, 0.0, 0.4]);
+    }
+
+    #[test]
+    fn a_box_is_cut_off_inside_the_end_and_keeps_its_other_side() {
+        let cut = |joints: bool, middle: [f64; 2], half: [f64; 2], margin: f64, way: f64| {
+            let (mut middle, mut half) = (middle, half);
+            travel(joints).cut(&mut middle, &mut half, margin, way);
+            [middle, half].as_flattened().to_vec()
+        };
+        let half = [0.5; 2];
+        // A twentieth of the box and the margin stay free: from 0.4 to 0.965.
+        let plain = [0.6825, 0.0, 0.2825, 0.5];
+        assert_near(&cut(false, [0.9, 0.0], half, 0.01, 10.0), &plain);
+        let left = [-0.6825, 0.0, 0.2825, 0.5];
+        assert_near(&cut(false, [-0.9, 0.0], half, 0.01, 10.0), &left);
+        // Near the start a tenth of the way stays free, and the middle stays where it is.
+        let near = [0.9, 0.0, 0.0999, 0.5];
+        assert_near(&cut(false, [0.9, 0.0], half, 0.01, 0.001), &near);
+        // Where the margin is large, nine tenths of the half stay free.
+        let small = [0.855, 0.0, 0.055, 0.1];
+        assert_near(&cut(false, [0.9, 0.0], [0.1; 2], 0.5, 10.0), &small);
+        // Joints: the box is made smaller around its middle, to a tenth at least.
+        let sum = [0.3, 0.4, 0.1, 0.15];
+        assert_near(&cut(true, [0.3, 0.4], [0.2, 0.3], 0.05, 10.0), &sum);
+        let least = [0.3, 0.69, 0.02, 0.03];
+        assert_near(&cut(true, [0.3, 0.69], [0.2, 0.3], 0.05, 10.0), &least);
+        let inside = [0.0, 0.0, 0.2, 0.3];
+        assert_near(&cut(true, [0.0, 0.0], [0.2, 0.3], 0.05, 10.0), &inside);
+        let low = [-0.1, -4.55, 0.06, 0.09];
+        assert_near(&cut(true, [-0.1, -4.55], [0.2, 0.3], 0.2, 10.0), &low);
+    }
+}
