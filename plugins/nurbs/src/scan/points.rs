@@ -43,6 +43,8 @@ pub fn ease(route: &Route, bounds: &Bounds, motion: &Rated, slowdowns: &mut Slow
         let knot = route.knot([from_mm, to_mm], &mut cursor);
         if let Some((knot_mm, sides)) = &knot {
             let [_, rest @ ..] = motion.derivatives(k, motion.place(k, *knot_mm));
+            // Where a block of a higher feed begins the lower one holds.
+            faster = faster.max(rest[0] / route.find(*knot_mm, &mut cursor).feed_mm_per_s);
             worst = sides.iter().fold(worst, |worst, side| {
                 worst.max(jerk_share(bounds, side, rest))
             });

@@ -248,6 +248,20 @@ impl<'a> Limit<'a> {
         let share = ((at_mm - a.at_mm) / (b.at_mm - a.at_mm)).clamp(0.0, 1.0);
         a.speed_mm_per_s + share * (b.speed_mm_per_s - a.speed_mm_per_s)
     }
+
+    /// The places behind one path coordinate, at which the limit was asked for last, and before another.
+    pub fn between(&self, from_mm: f64, to_mm: f64) -> &'a [Corner] {
+        let behind = &self.places[self.at..];
+        let first = behind
+            .iter()
+            .take_while(|place| place.at_mm <= from_mm)
+            .count();
+        let inside = &behind[first..];
+        &inside[..inside
+            .iter()
+            .take_while(|place| place.at_mm < to_mm)
+            .count()]
+    }
 }
 
 impl Tangential {

@@ -2,6 +2,8 @@
 
 /// Least duration of a ramp, s. A shorter one would change the speed by less than 0.003 mm/s.
 pub const MIN_S: f64 = 2e-4;
+/// Halvings in which a place of a ramp is found.
+const HALVINGS: usize = 30;
 
 /// What a ramp may use along the path.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -127,5 +129,18 @@ impl Ramp {
             b + t * (2.0 * c + t * 3.0 * d),
             2.0 * c + t * 6.0 * d,
         ]
+    }
+
+    /// When it is at `at_mm`, between two times, s: by halving.
+    pub fn time_at(&self, at_mm: f64, [mut from_s, mut to_s]: [f64; 2]) -> f64 {
+        for _ in 0..HALVINGS {
+            let middle_s = f64::midpoint(from_s, to_s);
+            if self.at(middle_s)[0] < at_mm {
+                from_s = middle_s;
+            } else {
+                to_s = middle_s;
+            }
+        }
+        to_s
     }
 }

@@ -112,7 +112,8 @@ fn merge(corners: &mut Vec<Corner>) {
     corners[count - 1] = if count > 1 { end } else { corners[0] };
 }
 
-/// The place of a ramp that is furthest above the limit, as a corner at the limit.
+/// The place of a ramp that is furthest above the limit, as a corner at the limit. Between two looks the limit may be lower than at
+/// both: where a block of another feed begins.
 fn worst(ramp: &Ramp, limit: &mut Limit, care: &Care) -> Option<Corner> {
     if ramp.duration_s == 0.0 {
         return None;
@@ -120,9 +121,7 @@ fn worst(ramp: &Ramp, limit: &mut Limit, care: &Care) -> Option<Corner> {
     let looks = (ramp.duration_s / care.look_s).ceil().clamp(1.0, MAX_LOOKS);
     let mut most = 1.0 + care.over;
     let mut found = None;
-    for n in 0..=looks as usize {
-        let [at_mm, speed, ..] = ramp.at(ramp.duration_s * n as f64 / looks);
-        let allowed = limit.at(at_mm);
+    let mut compare = |[at_mm, speed]: [f64; 2], allowed: f64| {
         if speed > most * allowed {
             most = speed / allowed;
             found = Some(Corner {
@@ -130,6 +129,21 @@ fn worst(ramp: &Ramp, limit: &mut Limit, care: &Care) -> Option<Corner> {
                 speed_mm_per_s: allowed,
             });
         }
+    };
+    let mut before = [0.0, ramp.start_mm, 0.0];
+    for n in 0..=looks as usize {
+        let t_s = ramp.duration_s * n as f64 / looks;
+        let [at_mm, speed, ..] = ramp.at(t_s);
+        let [before_s, before_mm, before_speed] = before;
+        for place in limit.between(before_mm, at_mm) {
+            // Ramps are monotonous.
+            if speed.max(before_speed) > (1.0 + care.over) * place.speed_mm_per_s {
+                let passed = ramp.at(ramp.time_at(place.at_mm, [before_s, t_s]));
+                compare([place.at_mm, passed[1]], place.speed_mm_per_s);
+            }
+        }
+        compare([at_mm, speed], limit.at(at_mm));
+        before = [t_s, at_mm, speed];
     }
     found
 }

@@ -277,3 +277,46 @@ fn windows_are_as_published() {
         }
     }
 }
+
+/// Where a block of a higher feed begins, ramps begin with it: what is reached within one look does not show the lower limit before.
+#[test]
+fn no_ramp_rises_before_the_end_of_a_block_of_a_lower_feed() {
+    const LIMITS: Tangential = Tangential {
+        acceleration_mm_per_s2: 3e5,
+        jerk_mm_per_s3: 4e7,
+    };
+    const LOW: f64 = 0.1;
+    const END_MM: f64 = 0.028;
+    let mut look = |at_mm: f64| {
+        let low = at_mm <= END_MM;
+        Spot {
+            speed_mm_per_s: if low { LOW } else { 400.0 },
+            tangential: LIMITS,
+            step_mm: 0.01,
+            knot_mm: if low && at_mm < END_MM {
+                END_MM - at_mm
+            } else {
+                f64::INFINITY
+            },
+        }
+    };
+    let start = Corner {
+        at_mm: 0.0,
+        speed_mm_per_s: 0.0,
+    };
+    let mut survey = Survey::default();
+    survey.make(start, 0.06, 1.0, &mut look);
+    let mut plan = Vec::new();
+    Rounds::default().make(
+        &mut survey.corners,
+        survey.feed_mm_per_s,
+        &Grade::even(LIMITS),
+        &mut Limit::new(&survey.places),
+        &CARE,
+        &mut plan,
+    );
+    let last = plan.iter().rfind(|ramp| ramp.start_mm <= END_MM).unwrap();
+    let [_, speed, ..] = last.at(last.time_at(END_MM, [0.0, last.duration_s]));
+    close(speed, LOW, 1e-3, 0.0);
+    assert!(plan.iter().any(|ramp| ramp.speed[0] > 100.0 * LOW));
+}
