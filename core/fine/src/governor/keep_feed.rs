@@ -85,7 +85,8 @@ impl Governor {
     }
 
     /// The greatest σ̈ up to `most` with which the speed at the end of the period is on the curve to `speed_mm_per_s` or below it,
-    /// and its mean below that.
+    /// and its mean below that. From above it comes down, and does not rise first: where the plan brakes by itself within the period,
+    /// harder than the curve, a rate that only kept to the curve at the end would.
     fn below(
         &self,
         speed_mm_per_s: f64,
@@ -104,7 +105,13 @@ impl Governor {
             jerk_mm_per_s3: RISE_JERK_SHARE * horizon.approach_jerk_share * jerk,
             reserve_s: RISE_PERIODS * h,
         };
-        let is_below = here.sigma * from.speed <= speed_mm_per_s / FEED_SHARE;
+        let driven = here.sigma * from.speed;
+        let is_below = driven <= speed_mm_per_s / FEED_SHARE;
+        let [most_at_end, most_in_mean] = if is_below {
+            [limit, speed_mm_per_s]
+        } else {
+            [driven; 2]
+        };
         let mut change = most;
         for _ in 0..ROUNDS {
             let mut way = *here;
@@ -116,12 +123,9 @@ impl Governor {
             let rise = way.sigma * way.sigma * to.rise + to.speed * way.rate_per_s;
             let (allowed, per_s) = curve.rise(limit - speed);
             let mut over = (rise - allowed) / (to.speed * h * (1.0 + per_s * h / 2.0));
-            if is_below {
-                let mean_over =
-                    (from.way_to_mm(&to) / h - speed_mm_per_s) * 6.0 / (to.speed * h * h);
-                let end_over = (speed - limit) * 2.0 / (to.speed * h * h);
-                over = over.max(mean_over).max(end_over);
-            }
+            let mean_over = (from.way_to_mm(&to) / h - most_in_mean) * 6.0 / (to.speed * h * h);
+            let end_over = (speed - most_at_end) * 2.0 / (to.speed * h * h);
+            over = over.max(mean_over).max(end_over);
             if (change == most && over <= 0.0) || over.abs() * h * h < PRECISION {
                 break;
             }
@@ -133,6 +137,7 @@ impl Governor {
 
 #[cfg(test)]
 mod tests {
+    use super::super::order3;
     use super::*;
     use crate::plan_ahead::{Ahead, Axes, PlanAhead};
     use crate::steps::Recent;
@@ -224,6 +229,44 @@ mod tests {
                 let change = (pair[1] - pair[0]) / PERIOD_S;
                 assert!((-JERK..1.0).contains(&change), "{change} mm/s³ for {feed}");
             }
+        }
+    }
+
+    /// A lower feed is asked for just where the plan brakes by itself, harder than the way down to that feed asks: σ may rise then, the
+    /// speed may not.
+    #[test]
+    fn on_the_way_down_to_a_lower_feed_the_speed_does_not_rise_where_the_plan_brakes() {
+        let limits = order3::tests::limits(5000.0, 1.5e6);
+        let governor = Governor::new(&limits, 2, PERIOD_S);
+        let (speed, sigma, feed) = (0.33, 0.6, 0.026);
+        for braking in [20.0, 50.0, 100.0, 150.0] {
+            let mut segment = Segment::rest(&AxisVector::ZERO, 2e-3);
+            // It brakes with that at the end of a period at this rate, and with nothing at its start.
+            let passed_s = sigma * PERIOD_S;
+            let last = -braking / (20.0 * passed_s.powi(3));
+            segment.coefficients[0] = [0.0, speed, 0.0, 0.0, 0.0, last];
+            segment.path = segment.coefficients[0];
+            segment.flags = SegmentFlags::default();
+            let ahead = Ahead::new(&segment, Some(0.0), 0, None);
+            let mut horizon = Horizon::new(&limits, 2, PERIOD_S);
+            horizon.fill(&ahead, PERIOD_S);
+            let mut way = RateState {
+                sigma,
+                rate_per_s: 0.0,
+                place: ahead.place(X_AND_A),
+                recent: Recent::default(),
+            };
+            let from = way.place.pace().unwrap();
+            let change = governor.below(feed, 0.1 / (PERIOD_S * PERIOD_S), &way, &horizon);
+            way.pass(change, PERIOD_S);
+            let to = way.place.pace().unwrap();
+            let most = sigma * speed * (1.0 + 1e-6);
+            let mean = from.way_to_mm(&to) / PERIOD_S;
+            let end = way.sigma * to.speed;
+            assert!(
+                end.max(mean) <= most,
+                "{end} and {mean} of {most} at {braking}"
+            );
         }
     }
 }
