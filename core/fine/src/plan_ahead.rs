@@ -372,7 +372,7 @@ impl<'a> PlanCursor<'a> {
     /// Where the plan is on its path here, per s of program time; `None` where nothing moves.
     ///
     /// The path coordinate of a planner is a polynomial of its own, which may fall short of the way that the axes drive: the
-    /// greater speed counts.
+    /// greater speed counts. Below zero it is the rounding of a polynomial at a rest.
     pub fn pace(&self) -> Option<Pace> {
         let segment = self.segment?;
         let [speed, rise, _] = derivatives(&segment.path, self.local_s);
@@ -380,7 +380,7 @@ impl<'a> PlanCursor<'a> {
             path_mm: segment.path_mm(self.local_s),
             position: [0.0; MAX_AXES],
             counted: self.plan.axes.counted(segment),
-            speed,
+            speed: speed.max(0.0),
             rise,
         };
         let (mut squares, mut product) = (0.0, 0.0);

@@ -371,6 +371,31 @@ mod tests {
         assert_eq!(f64::from(most), FEED_WAY_PERIODS[1]);
     }
 
+    /// A plan that ends at rest with a speed that rounding has left below zero is not too fast there.
+    #[test]
+    fn the_rounding_of_a_rest_ahead_lowers_no_rate() {
+        let mut segment = Segment::rest(&AxisVector::ZERO, 0.1);
+        segment.coefficients[0][1] = 0.1;
+        segment.coefficients[0][2] = -0.5;
+        segment.path = segment.coefficients[0];
+        segment.path[1] -= 1e-17;
+        segment.feed_mm_per_s = 1.0;
+        let ahead = Ahead::new(&segment, Some(0.0), 0, None);
+        let here = RateState {
+            sigma: 1.0,
+            rate_per_s: 0.0,
+            place: ahead.place(TWO_LINEAR),
+            recent: Recent::default(),
+        };
+        let aim = Aim {
+            goal: Goal::run(1.0, 1.0, None),
+            ratio: 1.0,
+            kept_rate: 0.5,
+            path: [0.1, -1.0, 0.0],
+        };
+        assert!(Below::new(&aim, &here, 1e-3).is_kept_at(1.0));
+    }
+
     /// At twice the feed on a line: lowering the rate to where the feed is kept takes little more than the shortest time.
     #[test]
     fn a_rate_is_lowered_to_the_feed_without_delay() {
