@@ -277,6 +277,41 @@ mod tests {
         assert!(counts.iter().all(|count| *count > 20), "{counts:?}");
     }
 
+    /// Beside a place of the path at these distances, by the number of chords from it.
+    #[test]
+    fn a_nearer_chord_is_looked_for_around_the_place_and_farther_while_it_is_too_far() {
+        let found = |middle: f64, next: f64, others: f64| {
+            let chords: Vec<_> = (0..21_u32)
+                .map(|n| Chord {
+                    start: [
+                        0.0,
+                        match n.abs_diff(10) {
+                            0 => middle,
+                            1..=3 => next,
+                            _ => others,
+                        },
+                    ],
+                    direction: [1.0, 0.0],
+                    length: 1.0,
+                    ..path(&mut Random::new(1), 0.0, 1.0)[0]
+                })
+                .collect();
+            beside(&open(&chords), 10, &[0.5, 0.0]).off
+        };
+        for (distances, nearest) in [
+            ([0.3, 0.1, 0.1], 0.3),
+            ([0.6, 0.4, 0.1], 0.4),
+            ([0.6, 0.7, 0.1], 0.6),
+            ([0.94, 0.96, 0.1], 0.94),
+            ([0.97, 0.96, 0.1], 0.1),
+            ([2.0, 3.0, 1.5], 1.5),
+        ] {
+            let [middle, next, others] = distances;
+            let found = found(middle, next, others);
+            assert!((found - nearest).abs() < 1e-12, "{distances:?}: {found}");
+        }
+    }
+
     /// Over a right angle: the corner stands off the line between places 0.3 mm before it and 0.8 mm behind it by the height of that triangle.
     #[test]
     fn a_corner_between_two_places_counts_as_far_as_it_stands_off_the_line_between_them() {

@@ -114,3 +114,61 @@ impl<const L: usize> Feeder<'_, L> {
         most
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::order::tests::{lines, open};
+
+    /// Chords of 1 mm each with these feeds, and waypoints at these places in these intervals.
+    fn asked(feeds: &[f64], waypoints: &[(f64, u32)], intervals: usize) -> Vec<f64> {
+        let points: Vec<_> = (0_u32..)
+            .take(feeds.len() + 1)
+            .map(|n| [f64::from(n), 0.0])
+            .collect();
+        let mut chords = lines(&points);
+        for (chord, feed) in chords.iter_mut().zip(feeds) {
+            chord.feed = *feed;
+        }
+        let run = open(&chords);
+        let along: Vec<_> = waypoints
+            .iter()
+            .map(|(s, _)| (*s, run.chord_at(*s, 0) as u32))
+            .collect();
+        let waypoints: Vec<_> = waypoints
+            .iter()
+            .map(|(_, interval)| Waypoint {
+                interval: *interval,
+                z: 0.5,
+                point: [0.0; 2],
+                half: [1.0; 2],
+            })
+            .collect();
+        let mut feeds = Feeds {
+            run: &run,
+            along: &along,
+            waypoints: &waypoints,
+            at: 0,
+        };
+        (0..intervals).map(|k| feeds.of(k)).collect()
+    }
+
+    #[test]
+    fn an_interval_has_the_lowest_feed_of_its_waypoints_and_of_one_on_either_side() {
+        let feeds = [50.0, 20.0, 70.0, 90.0];
+        // A waypoint in each: the one before counts, and the one behind.
+        let each = [(0.5, 0), (1.5, 1), (2.5, 2), (3.5, 3)];
+        assert_eq!(asked(&feeds, &each, 4), [20.0, 20.0, 20.0, 70.0]);
+        // Two in one interval, and none in others.
+        let some = [(0.5, 0), (0.7, 2), (2.5, 2), (3.2, 5), (3.6, 6)];
+        assert_eq!(
+            asked(&feeds, &some, 7),
+            [50.0, 50.0, 50.0, 70.0, 70.0, 70.0, 90.0]
+        );
+        // One on a vertex has the feeds of both of its chords; one just behind it has not.
+        assert_eq!(asked(&feeds, &[(3.0, 0), (3.5, 1)], 2), [70.0, 70.0]);
+        assert_eq!(asked(&feeds, &[(3.1, 0), (3.5, 1)], 2), [90.0, 90.0]);
+        // Without waypoints the lowest of all counts.
+        assert_eq!(asked(&feeds, &[], 2), [20.0, 20.0]);
+    }
+}

@@ -263,6 +263,24 @@ mod tests {
     }
 
     #[test]
+    fn what_binds_a_piece_is_the_first_limit_that_is_next_to_reached() {
+        let reached = |feed: f64, speed: f64, acceleration: f64, jerk: f64| {
+            bound(&Reached {
+                feed,
+                speed,
+                acceleration,
+                jerk,
+                bend: 0.0,
+            })
+        };
+        assert_eq!(reached(1.0, 1.0, 1.0, 1.0), Bound::Feed);
+        assert_eq!(reached(0.98, 0.99, 1.0, 1.0), Bound::Velocity);
+        assert_eq!(reached(0.98, 0.98, 0.96, 1.0), Bound::Acceleration);
+        assert_eq!(reached(0.98, 0.98, 0.94, 0.91), Bound::Jerk);
+        assert_eq!(reached(0.98, 0.98, 0.94, 0.89), Bound::Tolerance);
+    }
+
+    #[test]
     fn a_slow_motion_needs_time_for_its_stop_too() {
         let axis = tandem_sdk::AxisLimits {
             min_mm: -1.0,
