@@ -296,6 +296,28 @@ mod tests {
         }
     }
 
+    /// Twice as fast as the feed on the whole of a segment: half the rate everywhere on it, to its end, and nothing is known behind it.
+    #[test]
+    fn the_rate_is_low_to_the_end_of_what_is_too_fast() {
+        let mut segment = Segment::rest(&AxisVector::ZERO, 0.02);
+        segment.coefficients[0][1] = 20.0;
+        segment.path = segment.coefficients[0];
+        segment.feed_mm_per_s = 10.0;
+        let mut governor = Governor::new(&limits([1000.0; 2]), 2, 0.001);
+        let plan = PlanAhead::new(&segment, [&[], &[]], TWO_LINEAR);
+        governor.look_ahead(plan.begin(0.0), 1.0);
+        for offset_s in [0.0, 0.0005, 0.01, 0.018, 0.019, 0.0199] {
+            let rate = governor.rate_in_time(offset_s);
+            assert!((rate - 0.5).abs() < 1e-9, "{rate} at {offset_s} s");
+        }
+        assert_eq!(governor.rate_in_time(0.021), 1.0);
+        governor.look_ahead(plan.begin(0.0), 2.0);
+        assert_eq!(governor.rate_in_time(0.01), 1.0);
+        governor.look_ahead(plan.begin(0.0), 1.0);
+        governor.look_no_more();
+        assert_eq!(governor.rate_in_time(0.01), 1.0);
+    }
+
     proptest! {
         /// X slows down with nearly all that it has while Y gets fast: from the rate that is given, lowering it with what the
         /// limits leave keeps the feed at every place.

@@ -180,6 +180,52 @@ mod tests {
         assert!(!stands(&moves, 0.05));
     }
 
+    /// Below the feed the mean of a period counts as well, with all that the plan gains in it; above it the speed bends to the feed.
+    #[test]
+    fn the_mean_of_a_period_counts_from_below_the_feed() {
+        const FEED: f64 = 10.0;
+        let limits = [AxisLimits {
+            min_mm: -1000.0,
+            max_mm: 1000.0,
+            feed_mm_per_s: 1000.0,
+            rapid_mm_per_s: 1000.0,
+            acceleration_mm_per_s2: 50_000.0,
+            jerk_mm_per_s3: 1e6,
+            speed_difference_mm_per_s: 0.0,
+        }; MAX_AXES];
+        let governor = Governor::new(&limits, 2, PERIOD_S);
+        // Speed and mean speed of the period that is chosen where the plan goes up and down by so much within a period.
+        let chosen = |speed: f64, hump: f64| {
+            let mut segment = Segment::rest(&AxisVector::ZERO, 2.0);
+            let (first, second) = (4.0 * hump / PERIOD_S, 4.0 * hump / PERIOD_S / PERIOD_S);
+            segment.coefficients[0] = [0.0, speed, first / 2.0, -second / 3.0, 0.0, 0.0];
+            segment.path = segment.coefficients[0];
+            segment.flags = SegmentFlags::default();
+            let ahead = Ahead::new(&segment, Some(0.0), 0, None);
+            let mut horizon = Horizon::new(&limits, 2, PERIOD_S);
+            horizon.fill(&ahead, PERIOD_S);
+            let here = RateState {
+                sigma: 1.0,
+                rate_per_s: 0.0,
+                place: ahead.place(X_AND_A),
+                recent: Recent::default(),
+            };
+            let change = governor.below(FEED, 0.0, &here, &horizon);
+            let mut way = here;
+            way.pass(change, PERIOD_S);
+            let (from, to) = (here.place.pace().unwrap(), way.place.pace().unwrap());
+            [way.sigma * to.speed, from.way_to_mm(&to) / PERIOD_S, change]
+        };
+        let [speed, mean, _] = chosen(9.9, 3.0);
+        assert!(speed < FEED * (1.0 + 1e-6), "{speed}");
+        assert!((mean / FEED - 1.0).abs() < 1e-3, "{mean}");
+        let [_, mean, change] = chosen(9.0, 0.1);
+        assert!(mean < 9.2 && change == 0.0, "{mean}, {change}");
+        // Twice as fast as the feed it is not braked to it at once.
+        let [speed, mean, _] = chosen(20.0, 0.0);
+        assert!(mean > 19.0 && speed > 18.0, "{speed}, {mean}");
+    }
+
     /// The plan gets faster at a constant rate and goes beyond the feed: the speed comes to the feed in one bend, is at it soon after the
     /// plan is, and stays there.
     #[test]

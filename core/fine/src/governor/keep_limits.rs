@@ -338,6 +338,52 @@ mod tests {
         segment
     }
 
+    #[test]
+    fn halving_comes_near_the_last_change_that_leaves_a_way() {
+        let nearest = |wanted: f64, good: f64, highest: f64| {
+            nearest_with_way(wanted, good, HALVINGS, |change| change <= highest)
+        };
+        assert_eq!(nearest(1.0, 0.0, 1.0), Some(1.0));
+        assert_eq!(nearest(1.0, 0.0, 0.3), Some(0.25));
+        assert_eq!(nearest(1.0, 0.0, 0.8), Some(0.75));
+        assert_eq!(nearest(1.0, 0.0, 0.99), Some(0.9375));
+        assert_eq!(nearest(1.0, -1.0, 0.3), Some(0.25));
+        assert_eq!(nearest(1.0, 0.0, 0.01), None);
+    }
+
+    /// Program time of a period is that of its mean rate: from 0.5 up by 400 1/s it reaches over the end of a segment, down by as much
+    /// it does not.
+    #[test]
+    fn the_range_looks_as_far_as_the_period_goes() {
+        let mut first = Segment::rest(&AxisVector::ZERO, 0.004);
+        first.coefficients[0] = [0.0, 20.0, 0.0, 0.0, 0.0, 0.0];
+        first.flags = SegmentFlags::default();
+        let second = next(&first, [0.9 * JERK, 0.0], 0.1);
+        let queued = [Queued::Segment {
+            start_s: first.duration_s,
+            segment: second,
+        }];
+        let limits = limits();
+        let horizon = Horizon::new(&limits, 2, PERIOD_S);
+        let range = |rate_per_s: f64, left: f64| {
+            let way = RateState {
+                sigma: 0.5,
+                rate_per_s,
+                place: PlanAhead::new(&first, [&queued, &[]], TWO_LINEAR)
+                    .begin(first.duration_s - left * PERIOD_S),
+                recent: Recent::default(),
+            };
+            let ways = WaySearch::new(PERIOD_S);
+            let range = ways.range(&way, PERIOD_S, &horizon);
+            range.map(|range| [range.low, range.high])
+        };
+        // Ends of the segment that the period reaches change what is left of the jerk, others do not.
+        assert_ne!(range(40.0, 0.51), range(40.0, 0.6));
+        assert_eq!(range(-40.0, 0.51), range(-40.0, 0.6));
+        assert_ne!(range(-40.0, 0.47), range(-40.0, 0.6));
+        assert_eq!(range(40.0, 0.53), range(40.0, 0.6));
+    }
+
     proptest! {
         /// σ̈ at either end of the range keeps jerk and acceleration of both axes at every instant of the period, up to what the
         /// plan itself takes of them; and one of them is used up, so that no more could be taken.

@@ -758,3 +758,7 @@ pub(super) fn within(allowed: f64, planned_mm_per_s: f64) -> f64 {
 
 /// Relative tolerance on the feed.
 const FEED_TOLERANCE: f64 = 1e-7;
+
+#[cfg(test)]
+#[path = "govern_tests.rs"]
+mod tests;

@@ -215,3 +215,43 @@ impl Rate {
         self.progress = Progress::new(config);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rtrb::RingBuffer;
+    use tandem_sdk::{AxisLimits, Limits, Segment};
+
+    /// What has been planned for an older epoch, or is not queued yet, starts no motion; a first epoch with nothing in it does.
+    #[test]
+    fn motion_starts_when_that_of_its_own_epoch_is_queued() {
+        let axis = AxisLimits {
+            min_mm: -1.0,
+            max_mm: 1.0,
+            feed_mm_per_s: 1.0,
+            rapid_mm_per_s: 1.0,
+            acceleration_mm_per_s2: 1.0,
+            jerk_mm_per_s3: f64::INFINITY,
+            speed_difference_mm_per_s: 0.0,
+        };
+        let config = FineConfig::new(0.001, Limits::new(&[axis]).unwrap());
+        let (mut queue, segments) = RingBuffer::new(16);
+        let depth = Arc::new(Depth::default());
+        let ratios = RingBuffer::new(16).1;
+        let mut rate = Rate::new(&config, segments, ratios, Arc::clone(&depth));
+        depth.required_s.store(0.0);
+        assert!(rate.may_start());
+        rate.end_epoch(&AxisVector::ZERO);
+        assert!(!rate.may_start(), "nothing is planned");
+        depth.begin(rate.cursor().epoch(), 0.0);
+        depth.required_s.store(0.0);
+        assert!(!rate.may_start(), "nothing is queued");
+        let mut segment = Segment::rest(&AxisVector::ZERO, 1.0);
+        segment.epoch = rate.cursor().epoch();
+        let start_s = 0.0;
+        queue.push(Queued::Segment { start_s, segment }).unwrap();
+        assert!(rate.may_start());
+        depth.wall_s.store(-1.0);
+        assert!(!rate.may_start(), "not enough of it");
+    }
+}

@@ -1,0 +1,167 @@
+//! The follower of a plan on its own, on one axis.
+
+use rtrb::RingBuffer;
+use tandem_rings::Queued;
+use tandem_sdk::{AxisLimits, AxisVector, Limits, Segment, SegmentFlags};
+
+use super::*;
+
+const PERIOD_S: f64 = 0.001;
+const ACCELERATION: f64 = 1000.0;
+const JERK: f64 = 20_000.0;
+
+/// X along this path at a programmed feed.
+fn segment(path: [f64; 6], feed_mm_per_s: f64, duration_s: f64) -> Segment {
+    let mut segment = Segment::rest(&AxisVector::ZERO, duration_s);
+    segment.coefficients[0] = path;
+    segment.path = path;
+    segment.feed_mm_per_s = feed_mm_per_s;
+    segment.flags = SegmentFlags::default();
+    segment
+}
+
+/// In front of these segments, on a machine that is planned at twice the feed.
+fn follower(order: u32, segments: &[Segment]) -> PlanFollower {
+    let axis = AxisLimits {
+        min_mm: -1000.0,
+        max_mm: 1000.0,
+        feed_mm_per_s: 1000.0,
+        rapid_mm_per_s: 1000.0,
+        acceleration_mm_per_s2: ACCELERATION,
+        jerk_mm_per_s3: JERK,
+        speed_difference_mm_per_s: 0.0,
+    };
+    let config = FineConfig {
+        order,
+        max_feed_ratio: 2.0,
+        ..FineConfig::new(PERIOD_S, Limits::new(&[axis]).unwrap())
+    };
+    let (mut input, output) = RingBuffer::new(16);
+    let mut start_s = 0.0;
+    for segment in segments {
+        let queued = Queued::Segment {
+            start_s,
+            segment: *segment,
+        };
+        input.push(queued).unwrap();
+        start_s += segment.duration_s;
+    }
+    PlanFollower::new(&config, Cursor::new(output, &AxisVector::ZERO))
+}
+
+fn request(ask: Ask) -> Request {
+    Request {
+        ask,
+        ratios: AT_THE_FEED,
+        single_block: false,
+        max_rate: 1.0,
+        stop_deceleration_mm_per_s2: ACCELERATION,
+    }
+}
+
+const AT_THE_FEED: Ratios = Ratios {
+    feed: 1.0,
+    mean_feed: 1.0,
+    rapid: 1.0,
+};
+
+#[test]
+fn halving_finds_the_highest_rate_that_is_kept_and_gives_that_one_up_where_none_is() {
+    let mut follower = follower(2, &[]);
+    for highest in [0.01, 0.3, 0.5, 0.77] {
+        let found = follower.kept_by_halving(0.8, |_, sigma| sigma <= highest);
+        assert!(found <= highest && highest - found < 1e-6, "{found}");
+    }
+    assert_eq!(follower.kept_by_halving(0.8, |_, _| false), 0.8);
+    assert!(follower.kept_by_halving(0.8, |_, _| true) > 0.799_999);
+}
+
+/// The plan gets from rest to rest in a period, in the mean twice as fast as the feed: v = 12·F·τ·(1 − τ) at the share τ of it. At a
+/// rate below 1 its end is the faster place: 12·σ²·(1 − σ) of the feed.
+#[test]
+fn a_rate_from_rest_keeps_the_feed_at_its_end_and_in_its_mean() {
+    let feed = 10.0;
+    let (first, second) = (12.0 * feed / PERIOD_S, 12.0 * feed / PERIOD_S / PERIOD_S);
+    let bump = segment(
+        [0.0, 0.0, first / 2.0, -second / 3.0, 0.0, 0.0],
+        feed,
+        PERIOD_S,
+    );
+    let mut follower = follower(2, &[bump, segment([0.0; 6], feed, 1.0)]);
+    let sigma = follower.kept_from_rest(1.0, &AT_THE_FEED, f64::INFINITY);
+    let share = 12.0 * sigma * sigma * (1.0 - sigma);
+    assert!(
+        (share - 1.0).abs() < 1e-5 && sigma < 0.4,
+        "{sigma}: {share}"
+    );
+}
+
+/// Under constant acceleration the speed after some periods grows with the rate too: at the geometric mean of two rates it is kept.
+#[test]
+fn a_rate_to_begin_with_is_as_high_as_keeps_the_feed_for_some_periods() {
+    for feed in [0.5, 2.0, 5.0] {
+        let mut follower = follower(3, &[segment([0.0, 0.0, 500.0, 0.0, 0.0, 0.0], feed, 1.0)]);
+        follower.governor.jump(1.0);
+        follower.begin_below(&AT_THE_FEED);
+        let soon_s = f64::from(BEGINNING_PERIODS) * PERIOD_S;
+        let highest = (feed / (ACCELERATION * soon_s)).sqrt();
+        let sigma = follower.governor.sigma();
+        assert!(
+            sigma <= highest && sigma > 0.99 * highest,
+            "{sigma}, {highest}"
+        );
+        follower.governor.jump(0.5 * highest);
+        follower.begin_below(&AT_THE_FEED);
+        assert_eq!(follower.governor.sigma(), 0.5 * highest);
+    }
+}
+
+/// Without a jerk limit no more program time passes while slowing down than at the present rate; with one it may.
+#[test]
+fn what_lies_beyond_a_period_at_the_present_rate_counts_only_where_it_may_be_reached() {
+    for (order, ask, share) in [
+        (2, Ask::Run, 1.0),
+        (2, Ask::Hold, 0.5),
+        (2, Ask::Stop, 0.5),
+        (2, Ask::Starve, 0.5),
+        (3, Ask::Run, 1.0),
+        (3, Ask::Hold, 1.0),
+    ] {
+        let mut follower = follower(order, &[segment([0.0, 5.0, 0.0, 0.0, 0.0, 0.0], 10.0, 1.0)]);
+        follower.cursor.advance(0.1, |_| false);
+        follower.governor.jump(0.5);
+        follower.govern(request(ask));
+        let covered = follower.points.covered_s / PERIOD_S;
+        assert!((covered - share).abs() < 1e-9, "{order} {ask:?}: {covered}");
+    }
+}
+
+/// At twice the feed of a line, next to one of a higher feed that begins within the period: the rate does not rise before it has begun.
+#[test]
+fn the_feed_of_a_line_counts_to_its_end() {
+    let line = |feed| segment([0.0, 20.0, 0.0, 0.0, 0.0, 0.0], feed, 1.0);
+    for (left, feeds) in [(0.3, [10.0, 15.0]), (0.3, [10.0, 10.0])] {
+        let mut follower = follower(3, &feeds.map(line));
+        follower.cursor.advance(1.0 - left * PERIOD_S, |_| false);
+        follower.governor.jump(0.5);
+        let delta_s = follower.govern(request(Ask::Run)).delta_s;
+        assert!(
+            delta_s <= 0.5 * PERIOD_S * (1.0 + 1e-9),
+            "{feeds:?}: {delta_s}"
+        );
+        assert!(delta_s > 0.49 * PERIOD_S, "{feeds:?}: {delta_s}");
+    }
+    // Behind the border it rises.
+    let mut follower = follower(3, &[10.0, 15.0].map(line));
+    follower.cursor.advance(1.0 + 0.1 * PERIOD_S, |_| false);
+    follower.governor.jump(0.5);
+    assert!(follower.govern(request(Ask::Run)).delta_s > 0.5 * PERIOD_S * (1.0 + 1e-6));
+}
+
+#[test]
+fn a_rate_is_lowered_where_the_plan_is_above_what_is_allowed() {
+    assert_eq!(within(10.0, 5.0), 1.0);
+    assert_eq!(within(10.0, 10.0 * (1.0 + 1e-8)), 1.0);
+    assert_eq!(within(10.0, 20.0), 0.5);
+    assert_eq!(within(0.0, 20.0), 0.0);
+}
