@@ -123,13 +123,17 @@ impl Braking {
     }
 }
 
-/// Rough periods for which the rate that is told holds though the rough loop is late.
+/// Rough periods for which the rate that is told holds though the rough loop is late. With half of it a stop from the rate that a full
+/// ring allows ends behind the ring, where the loop is two periods late (`from_the_rate_that_a_full_ring_allows_a_stop_ends_inside_it`);
+/// twice of it costs rate and queue alone.
 pub const SERVED_FOR_PERIODS: f64 = 2.0;
 
-/// Halvings in which the rate is found that the ring allows: to a millionth.
+/// Halvings in which the rate is found that the ring allows: to a millionth, from below. With half of them it is up to a thousandth too
+/// low, and more of them cost time alone.
 const HALVINGS: u32 = 20;
 
-/// The rate at least, for a queue whose segments leave no deceleration at all: the machine has to get out of it.
+/// The rate at least, for a queue whose segments leave no deceleration at all: the machine has to get out of it. Any rate above nothing
+/// does that; half or double of it change only how long it takes.
 const MIN_RATE: f64 = 1e-3;
 
 impl QueueDepth {

@@ -5,7 +5,7 @@ use tandem_rings::RoughEnd;
 use tandem_sdk::{Accepted, AxisLimits, Edge, Event, EventKind, NurbsData, Planner};
 
 use crate::Observer;
-use crate::depth::QueueDepth;
+use crate::depth::{QueueDepth, SERVED_FOR_PERIODS};
 use crate::easing::Easing;
 use crate::gather::{Gathering, Slowness};
 use crate::queue::Queue;
@@ -122,8 +122,9 @@ impl RoughError {
 /// How often in one rough period a planner may emit less than half of what it is asked for, though more is to come.
 const MAX_SHORT_ADVANCES: u32 = 1000;
 
-/// Rough periods that are queued beyond what the worst stop asks for.
-const MARGIN_PERIODS: f64 = 3.0;
+/// Rough periods that are queued beyond what the worst stop asks for: the one until the rough loop comes again, and those by which it
+/// may be late.
+const MARGIN_PERIODS: f64 = 1.0 + SERVED_FOR_PERIODS;
 
 /// The soft loop of one program run.
 #[allow(clippy::struct_excessive_bools)] // independent facts about the stream

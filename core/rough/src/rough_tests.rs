@@ -112,6 +112,19 @@ fn a_rough_period_asks_for_the_depth_and_for_no_more() {
     }
 }
 
+/// It drives on as planned while the rough loop is late by no more than the rate that it tells holds for, and not much longer.
+#[test]
+fn a_rough_loop_that_is_late_leaves_what_the_worst_stop_asks_for() {
+    let (mut rough, _calls, (fine, _host)) = with(|duration_s, sink| {
+        piece(duration_s, SegmentFlags::default(), sink);
+        (duration_s, false)
+    });
+    rough.step(&mut ()).unwrap();
+    let late_s = (1.0 + SERVED_FOR_PERIODS) * ROUGH_PERIOD_S;
+    assert!(fine.depth.may_start(late_s - 1e-9));
+    assert!(!fine.depth.may_start(late_s + 2.0 * ROUGH_PERIOD_S));
+}
+
 #[test]
 fn a_ring_that_gets_room_is_filled_in_the_same_period_and_said_to_be_full() {
     // Eight entries hold far less than the depth asks for, and one call emits more than has room beside what is there.
