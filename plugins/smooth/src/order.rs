@@ -14,15 +14,16 @@ const REACH: f64 = 4.0;
 /// Path coordinates of samples; keeps its memory.
 #[derive(Debug, Default)]
 pub struct Order {
-    /// The first place that each sample may have, and the last; neither ever goes back.
+    /// The first place that each sample of the window may have; it never goes back.
     first: Vec<f64>,
+    /// The last place that each sample may have, of those before the window too; nor does it.
     last: Vec<f64>,
 }
 
 impl Order {
     /// Finds the places of `samples` in a motion to `end` that follows the path: each within tolerance of the path, none before
-    /// that of the sample before; false where there are none. Samples before `begin` are those of another window; where it is
-    /// left the path is near chord `near`.
+    /// that of the sample before; false where there are none. Samples before `begin` are those of another window, which has looked at
+    /// them; where it is left the path is near chord `near`.
     #[inline(always)]
     pub fn walk<const L: usize>(
         &mut self,
@@ -43,18 +44,23 @@ impl Order {
             self.first.push(walker.s());
         }
         let mut walker = Walker::begin(run, end);
-        for n in (begin..samples.len()).rev() {
-            if !walker.goes_back(&samples[(n + 1).min(samples.len() - 1)], &samples[n]) {
+        for n in (0..samples.len()).rev() {
+            if walker.goes_back(&samples[(n + 1).min(samples.len() - 1)], &samples[n]) {
+                self.last.push(walker.s());
+            } else if n >= begin {
                 return false;
+            } else {
+                // On a part of the path that is known no more.
+                self.last.resize(samples.len(), f64::NEG_INFINITY);
+                break;
             }
-            self.last.push(walker.s());
         }
         self.last.reverse();
         true
     }
 
-    /// Between which samples, counted from where the window begins, a vertex at `s` may be passed. Vertices are asked for in their
-    /// order: how many samples lie before one is what was `passed` so far, or more.
+    /// Between which samples a vertex at `s` may be passed: where the path comes by again, those before the window are none that pass it
+    /// behind its start. Vertices are asked for in their order: how many samples lie before one is what was `passed` so far, or more.
     #[inline(always)]
     pub fn around(&self, s: f64, passed: &mut [usize; 2]) -> (usize, usize) {
         let [first, behind] = passed;
@@ -64,7 +70,8 @@ impl Order {
         while self.first.get(*behind).is_some_and(|place| *place <= s) {
             *behind += 1;
         }
-        (first.saturating_sub(1), behind.saturating_sub(1))
+        let before = self.last.len() - self.first.len();
+        (first.saturating_sub(1), before + behind.saturating_sub(1))
     }
 }
 
@@ -232,5 +239,24 @@ pub(crate) mod tests {
             &path,
             &[[0.0, 0.0], [0.5, 0.0], [1.0, 0.0], [1.0, -0.5], [1.0, -1.0]]
         ));
+    }
+
+    /// Where the path turns back and comes by again, the samples before a window are not those that pass the vertices in it.
+    #[test]
+    fn samples_before_a_window_pass_no_vertex_behind_its_start() {
+        let chords = lines(&[[0.0, 0.0], [1.0, 0.0], [0.5, 0.005], [2.0, 0.0]]);
+        let run = open(&chords);
+        // The window begins on the way back.
+        let samples = [0.3, 0.5, 0.7, 0.9, 1.0, 0.9, 0.7, 0.5, 0.7, 2.0].map(|x| [x, 0.003]);
+        let mut order = Order::default();
+        assert!(order.walk(&run, &samples, 6, (1, run.end())));
+        let tip = chords[2].s;
+        assert_eq!(order.around(tip, &mut [0; 2]), (6, 7));
+        // The corner before was passed by them.
+        let (first, last) = order.around(chords[1].s, &mut [0; 2]);
+        assert!(first <= 4 && last >= 4, "{first} to {last}");
+        // What lies before the known path has no place on it.
+        let far = [[-5.0, 0.0], [0.7, 0.003], [2.0, 0.0]];
+        assert!(order.walk(&run, &far, 1, (2, run.end())));
     }
 }

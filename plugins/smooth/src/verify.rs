@@ -266,11 +266,8 @@ impl<const L: usize> Checker<L> {
                 piece += 1;
             }
             if chord.s > from {
-                let before = start.before.len();
-                let (first, last) = self.order.around(chord.s, &mut passed);
-                // Where the window begins the samples before it count too.
-                let among = (if first == 0 { 0 } else { before + first }, before + last);
-                let near = (t / period_s) as usize + before;
+                let among = self.order.around(chord.s, &mut passed);
+                let near = (t / period_s) as usize + start.before.len();
                 let off = self.nearest_sample(near, among, &chord.start, tolerance);
                 let mut bulge = self.bends[piece] * period_s * period_s / 8.0;
                 if off + bulge > ALLOWED * tolerance {
