@@ -92,8 +92,11 @@ pub fn ranges(
     let Some((cap_mm, first)) = widest_tolerance(&walker, &followed.chain) else {
         return walker.any_ranges(&followed.chain);
     };
-    let last = latest(elements, followed.end, &followed.chain, cap_mm, options)?;
-    Some(first.into_iter().zip(last).collect())
+    if let Some(last) = latest(elements, followed.end, &followed.chain, cap_mm, options) {
+        return Some(first.into_iter().zip(last).collect());
+    }
+    // The way back may dawdle too, whatever is left of the tolerance.
+    walker.any_ranges(&followed.chain)
 }
 
 impl Followed {
