@@ -8,7 +8,7 @@ use std::path::Path;
 use tandem_estimate::diagnose::{Evidence, Fitted, LinearFit, MAX_RMS, MIN_R2, fit_all, linear};
 use tandem_estimate::experiment::{Experiment, Measured};
 use tandem_estimate::planned::{self, PlannerKind};
-use tandem_estimate::polygon::Timed;
+use tandem_estimate::polygon::{STROKE, Timed};
 use tandem_estimate::{Choice, measurements, model_file};
 use tandem_host::with_stand_ins;
 use tandem_machine::Machine;
@@ -92,8 +92,8 @@ fn program(path: &Path, machine: &Machine) -> Result<u8, Box<dyn Error>> {
     out.finish()?;
     let (count, name) = (experiment.polygons.len(), path.display());
     print(&format!(
-        "{name}: {count} polygons, an M0 before each; write what they take to a CSV file with the columns\n\
-         n,side_mm,repetitions,seconds,reading_error_s\nand come back with --from, or with --log where the control logs times and lines\n"
+        "{name}: {count} polygons and lines there and back, an M0 before each; write what they take to a CSV file with the columns\n\
+         n,side_mm,repetitions,seconds,reading_error_s,axis\n(a line there and back has n 2, and its axis is X or Y; reading_error_s may be left out)\nand come back with --from, or with --log where the control logs times and lines\n"
     ));
     left_out(&experiment);
     Ok(0)
@@ -138,8 +138,12 @@ fn measure(options: &args::Calibrate, machine: &Machine) -> Result<Measured, Box
 }
 
 fn table(measured: &Measured, evidence: &Evidence, fits: &[Fitted]) -> String {
-    let (polygons, corners) = (measured.timed.len(), measured.corners.len());
-    let mut text = format!("measured: {polygons} polygons, {corners} minimum feeds at corners\n");
+    let is_stroke = |timed: &&Timed| timed.polygon.is_stroke();
+    let strokes = measured.timed.iter().filter(is_stroke).count();
+    let (polygons, corners) = (measured.timed.len() - strokes, measured.corners.len());
+    let mut text = format!(
+        "measured: {polygons} polygons, {strokes} lines there and back, {corners} minimum feeds at corners\n"
+    );
     let percent = |share: f64| 100.0 * share;
     let _ = writeln!(
         text,
@@ -305,11 +309,12 @@ fn regression(
 /// Residuals of the times in %, a row for each number of corners, a column for each side.
 fn residuals(fitted: &Fitted, timed: &[Timed]) -> String {
     let mut sides: Vec<f64> = timed.iter().map(|t| t.polygon.side_mm).collect();
-    let mut corners: Vec<u32> = timed.iter().map(|t| t.polygon.corners).collect();
+    let row = |timed: &Timed| (timed.polygon.corners, timed.polygon.along);
+    let mut rows: Vec<_> = timed.iter().map(row).collect();
     sides.sort_by(f64::total_cmp);
     sides.dedup();
-    corners.sort_unstable();
-    corners.dedup();
+    rows.sort_by_key(|(corners, along)| (*corners, along.letter()));
+    rows.dedup();
     let mut text = format!(
         "residuals of {}, % of the time\n  n \\ side, mm",
         fitted.choice.name()
@@ -317,12 +322,16 @@ fn residuals(fitted: &Fitted, timed: &[Timed]) -> String {
     for side in &sides {
         let _ = write!(text, " {side:8}");
     }
-    for n in corners {
-        let _ = write!(text, "\n{n:13}");
+    for (corners, along) in rows {
+        let name = match corners {
+            STROKE => format!("{corners}, along {}", along.letter()),
+            _ => corners.to_string(),
+        };
+        let _ = write!(text, "\n{name:>13}");
         for side in &sides {
             let at = timed
                 .iter()
-                .position(|t| t.polygon.corners == n && t.polygon.side_mm == *side);
+                .position(|t| row(t) == (corners, along) && t.polygon.side_mm == *side);
             let _ = match at.map(|index| 100.0 * fitted.residuals[index]) {
                 Some(percent) => write!(text, " {percent:8.3}"),
                 None => write!(text, " {:>8}", "-"),

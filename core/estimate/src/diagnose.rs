@@ -180,7 +180,8 @@ impl Evidence {
     pub fn of(timed: &[Timed]) -> Self {
         let spread = |of: &dyn Fn(&Timed) -> f64| {
             let mut by_corners: BTreeMap<u32, [f64; 2]> = BTreeMap::new();
-            for t in timed.iter().filter(|t| t.polygon.side_mm <= 1.0) {
+            let counts = |t: &&Timed| t.polygon.side_mm <= 1.0 && !t.polygon.is_stroke();
+            for t in timed.iter().filter(counts) {
                 let [least, most] = by_corners
                     .entry(t.polygon.corners)
                     .or_insert([f64::INFINITY, 0.0]);
@@ -351,7 +352,8 @@ pub struct LinearFit {
     pub long: Option<Goodness>,
 }
 
-/// Fits the published regression. `block_time_s` is what short blocks take: longer ones do not enter equation (9).
+/// Fits the published regression. `block_time_s` is what short blocks take: longer ones do not enter equation (9), nor do strokes,
+/// for it was published for turns of up to 120°.
 ///
 /// # Errors
 /// Too few measurements.
@@ -365,8 +367,10 @@ pub fn linear(
         ..Coefficients::default()
     };
     let a = coefficients.acceleration_mm_per_s2;
-    let short =
-        |t: &&Timed| block_time_s.is_none_or(|s| t.polygon.side_mm <= 0.999 * s * t.feed_mm_per_s);
+    let short = |t: &&Timed| {
+        !t.polygon.is_stroke()
+            && block_time_s.is_none_or(|s| t.polygon.side_mm <= 0.999 * s * t.feed_mm_per_s)
+    };
     let (rows, feeds): (Vec<_>, Vec<_>) = timed
         .iter()
         .filter(short)

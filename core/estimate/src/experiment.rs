@@ -10,7 +10,9 @@ use tandem_sdk::AxisVector;
 
 use crate::diagnose::Corner;
 use crate::measurements::LogRow;
-use crate::polygon::{CORNERS, FEED_MM_PER_MIN, Polygon, SIDES_MM, Timed};
+use crate::polygon::{
+    CORNERS, FEED_MM_PER_MIN, PlaneAxis, Polygon, SIDES_MM, STROKE, STROKES_MM, Timed,
+};
 
 /// Turns of the V paths, degrees.
 const TURNS_DEG: [f64; 11] = [
@@ -83,14 +85,16 @@ impl Experiment {
         let finite = |value: f64| if value.is_finite() { value } else { 0.0 };
         let room_mm = half(0).min(half(1));
         let feed = FEED_MM_PER_MIN / MM_PER_MIN;
-        let all = CORNERS
-            .iter()
-            .flat_map(|corners| SIDES_MM.map(|side_mm| (*corners, side_mm)));
-        let all = all.map(|(corners, side_mm)| Polygon {
-            corners,
-            side_mm,
-            rounds: blocks.div_ceil(corners),
+        let all = CORNERS.iter().flat_map(|corners| {
+            SIDES_MM.map(|side_mm| Polygon {
+                corners: *corners,
+                side_mm,
+                rounds: blocks.div_ceil(*corners),
+                along: PlaneAxis::X,
+            })
         });
+        // Behind the others, so that a log of a program without them is one that ends early.
+        let all = all.chain(strokes(blocks));
         let (polygons, left_out) =
             all.partition::<Vec<_>, _>(|polygon| polygon.radius_mm() <= room_mm);
         let this = Self {
@@ -136,13 +140,17 @@ impl Experiment {
             })
         });
         let timed: Vec<_> = timed.flatten().filter(|timed| timed.time_s > 0.0).collect();
-        if timed.len() == lines.len() {
+        // A control may have driven a program that was written before there were strokes.
+        let round = |polygons: &mut dyn Iterator<Item = &Polygon>| {
+            polygons.filter(|polygon| !polygon.is_stroke()).count()
+        };
+        let found = round(&mut timed.iter().map(|timed| &timed.polygon));
+        let wanted = round(&mut self.polygons.iter());
+        if found == wanted {
             return Ok(timed);
         }
         Err(format!(
-            "{} of {} polygons are in the log: it is to be that of the program which --program writes",
-            timed.len(),
-            lines.len()
+            "{found} of {wanted} polygons are in the log: it is to be that of the program which --program writes"
         ))
     }
 
@@ -156,10 +164,16 @@ impl Experiment {
                     corners,
                     side_mm,
                     rounds,
+                    along,
                 } = polygon;
+                let what = if polygon.is_stroke() {
+                    format!("there and back along {}", along.letter())
+                } else {
+                    format!("n {corners}")
+                };
                 let _ = writeln!(
                     text,
-                    "(note the seconds from here: n {corners} side {side_mm} repetitions {rounds})"
+                    "(note the seconds from here: {what} side {side_mm} repetitions {rounds})"
                 );
                 text += "M0\n";
                 lines.last += 2;
@@ -262,6 +276,24 @@ impl Experiment {
         }
         Ok(watch.measured())
     }
+}
+
+/// Strokes along both axes. None is longer together than `blocks` of the longest sides of the polygons are.
+fn strokes(blocks: u32) -> impl Iterator<Item = Polygon> {
+    let longest_mm = SIDES_MM[SIDES_MM.len() - 1];
+    [PlaneAxis::X, PlaneAxis::Y]
+        .into_iter()
+        .flat_map(move |along| {
+            STROKES_MM.map(|side_mm| {
+                let share = (longest_mm / side_mm).min(1.0);
+                Polygon {
+                    corners: STROKE,
+                    side_mm,
+                    rounds: (f64::from(blocks) * share / f64::from(STROKE)).ceil() as u32,
+                    along,
+                }
+            })
+        })
 }
 
 fn vees() -> impl Iterator<Item = Vee> {

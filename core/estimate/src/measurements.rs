@@ -1,5 +1,5 @@
-//! Times noted at a control, as CSV: `n,side_mm,repetitions,seconds`, `feed_mm_per_min` where it was not 5000, and
-//! `reading_error_s` where it is known how far a reading may be off.
+//! Times noted at a control, as CSV: `n,side_mm,repetitions,seconds`, `feed_mm_per_min` where it was not 5000, `reading_error_s`
+//! where it is known how far a reading may be off, and `axis` of lines there and back.
 
 use std::io::Read as _;
 use std::path::Path;
@@ -7,7 +7,7 @@ use std::path::Path;
 use serde::Deserialize;
 
 use crate::diagnose::Corner;
-use crate::polygon::{FEED_MM_PER_MIN, Polygon, Timed};
+use crate::polygon::{FEED_MM_PER_MIN, PlaneAxis, Polygon, STROKE, Timed};
 
 /// A row as it is written.
 #[derive(Deserialize)]
@@ -19,6 +19,7 @@ struct Row {
     seconds: f64,
     feed_mm_per_min: Option<f64>,
     reading_error_s: Option<f64>,
+    axis: Option<String>,
 }
 
 /// Reads the measurements in the file at `path`. Lines that begin with # are left out.
@@ -244,6 +245,22 @@ fn cause(error: &csv::Error, headers: &csv::StringRecord) -> String {
 }
 
 impl Row {
+    /// The axis of a stroke, which has to be stated; other polygons begin along X.
+    fn along(&self) -> Result<PlaneAxis, String> {
+        let axis = self.axis.as_deref().map(str::trim).unwrap_or_default();
+        match (self.n, axis) {
+            (STROKE, "X" | "x") => Ok(PlaneAxis::X),
+            (STROKE, "Y" | "y") => Ok(PlaneAxis::Y),
+            (STROKE, _) => Err(format!(
+                "axis: \"{axis}\" is neither X nor Y; two corners are a line there and back along one of them"
+            )),
+            (_, "") => Ok(PlaneAxis::X),
+            (n, _) => Err(format!(
+                "axis: \"{axis}\" belongs to lines there and back, n = 2, and not to n = {n}"
+            )),
+        }
+    }
+
     fn timed(&self) -> Result<Timed, String> {
         let feed_mm_per_min = self.feed_mm_per_min.unwrap_or(FEED_MM_PER_MIN);
         let positive = [
@@ -262,9 +279,9 @@ impl Row {
                 "reading_error_s: {reading_error_s} is not from 0 to the time itself"
             ));
         }
-        if self.n < 3 || self.repetitions == 0 {
+        if self.n < STROKE || self.repetitions == 0 {
             return Err(
-                "n: a polygon has 3 corners at least, and is gone round once at least".to_string(),
+                "n: a polygon has 2 corners at least, and is gone round once at least".to_string(),
             );
         }
         if self
@@ -278,6 +295,7 @@ impl Row {
             corners: self.n,
             side_mm: self.side_mm,
             rounds: self.repetitions,
+            along: self.along()?,
         };
         Ok(Timed {
             polygon,

@@ -13,7 +13,7 @@ use tandem_sdk::{
     Accepted, Block, BlockKind, BlockReport, MAX_AXES, Planner, Segment, SegmentSink,
 };
 
-use crate::polygon::{Polygon, Timed};
+use crate::polygon::{PlaneAxis, Polygon, Timed};
 
 /// Blocks of a polygon before the rounds that are timed.
 const BEFORE_BLOCKS: u32 = 8;
@@ -321,6 +321,9 @@ const WORTH_OF_AXES: f64 = 0.8;
 const ASKEW: [f64; 3] = [0.6, 1.0, 1.0 / 0.6];
 /// Two axes exchanged are a start worth a search where they leave less than so many times the squares.
 const TURNED: f64 = 4.0;
+/// Strokes along each axis with which acceleration and jerk of it are told by them alone. Their times are smooth in the constants, while
+/// those of polygons step by up to a percent where windows of the plan end elsewhere, and a search among those alone stops early.
+const TELLING_STROKES: usize = 3;
 /// Polygons this near to their feed tell nothing of the limits.
 const AT_FEED: f64 = 0.998;
 
@@ -409,9 +412,37 @@ pub fn fit(
         kind,
         by_axes: true,
     };
-    let mut found = alike.clone();
-    let square = fine.square(&alike);
-    // Which axis is the weaker one the polygons tell, which lie askew; it may be so in one limit and not in the other.
+    let is_stroke = |timed: &&Timed| timed.polygon.is_stroke();
+    let strokes: Vec<Timed> = telling.iter().filter(is_stroke).copied().collect();
+    let along = |axis| strokes.iter().filter(|t| t.polygon.along == axis).count();
+    let tell_axes = [PlaneAxis::X, PlaneAxis::Y]
+        .into_iter()
+        .all(|axis| along(axis) >= TELLING_STROKES);
+    let of_axes = if tell_axes {
+        let alone = Fit {
+            bench: &bench(&strokes, FEW_BLOCKS)?,
+            timed: &strokes,
+        };
+        Some(fine.near(each, &alone.near(each, &alike).0))
+    } else {
+        without_strokes(&rough, &fine, &alike)
+    };
+    let worth = |of_axes: &(Planned, f64)| of_axes.1 < WORTH_OF_AXES.powi(2) * fine.square(&alike);
+    let found = of_axes
+        .filter(worth)
+        .map_or_else(|| alike.clone(), |(planned, _)| planned);
+    let times_s = bench(timed, MANY_BLOCKS)?.times_s(&found)?;
+    Ok((found, times_s))
+}
+
+/// The best constants for each axis that polygons alone tell, and the squares that they leave. They lie askew, and so they tell which
+/// axis is the weaker one; it may be so in one limit and not in the other.
+fn without_strokes(rough: &Fit, fine: &Fit, alike: &Planned) -> Option<(Planned, f64)> {
+    let kind = alike.kind;
+    let each = Form {
+        kind,
+        by_axes: true,
+    };
     let factors = ASKEW.iter().flat_map(|a| ASKEW.map(|j| [*a, j]));
     let counts = |[a, j]: &[f64; 2]| match kind {
         PlannerKind::Smooth => [*a, *j] != [1.0; 2],
@@ -419,25 +450,18 @@ pub fn fit(
     };
     let starts = factors
         .filter(counts)
-        .map(|factors| rough.askew(&alike, factors));
-    if let Some((_, start)) = starts.min_by(|(one, _), (other, _)| one.total_cmp(other)) {
-        let of_axes = fine.near(each, &start);
-        // Two axes exchanged make nearly the same times.
-        let mut turned = of_axes.0.clone();
-        turned.acceleration_mm_per_s2.swap(0, 1);
-        turned.jerk_mm_per_s3.swap(0, 1);
-        let of_axes = if fine.square(&turned) < TURNED * of_axes.1 {
-            let other = fine.near(each, &turned);
-            if other.1 < of_axes.1 { other } else { of_axes }
-        } else {
-            of_axes
-        };
-        if of_axes.1 < WORTH_OF_AXES.powi(2) * square {
-            found = of_axes.0;
-        }
+        .map(|factors| rough.askew(alike, factors));
+    let (_, start) = starts.min_by(|(one, _), (other, _)| one.total_cmp(other))?;
+    let found = fine.near(each, &start);
+    // Two axes exchanged make nearly the same times.
+    let mut turned = found.0.clone();
+    turned.acceleration_mm_per_s2.swap(0, 1);
+    turned.jerk_mm_per_s3.swap(0, 1);
+    if fine.square(&turned) >= TURNED * found.1 {
+        return Some(found);
     }
-    let times_s = bench(timed, MANY_BLOCKS)?.times_s(&found)?;
-    Ok((found, times_s))
+    let other = fine.near(each, &turned);
+    Some(if other.1 < found.1 { other } else { found })
 }
 
 /// What is fitted to what.

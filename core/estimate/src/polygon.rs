@@ -1,6 +1,6 @@
 //! The polygons of the calibration: what they are made of, and what a model says they take.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{FRAC_PI_2, TAU};
 
 use crate::element::Element;
 use crate::model::{Model, Spent};
@@ -9,13 +9,47 @@ use crate::model::{Model, Spent};
 pub const CORNERS: [u32; 12] = [3, 4, 5, 6, 8, 9, 12, 18, 36, 72, 180, 360];
 /// Sides of the polygons, mm: the paper's 0.10, 0.42 and 1.00, and two longer ones.
 pub const SIDES_MM: [f64; 5] = [0.1, 0.42, 1.0, 2.0, 4.0];
+/// Sides of the strokes along X and along Y, mm. Polygons of three corners and more take nearly as long when X and Y are exchanged,
+/// and their short sides say little of acceleration where jerk is bounded. A stroke moves one axis, from rest to rest; the longest
+/// reaches its feed.
+pub const STROKES_MM: [f64; 6] = [1.0, 2.0, 4.0, 8.0, 16.0, 32.0];
+/// Corners of a stroke.
+pub const STROKE: u32 = 2;
 /// Their feed, mm/min.
 pub const FEED_MM_PER_MIN: f64 = 5000.0;
 
 /// Blocks after which nothing changes any more from round to round.
 const ENOUGH_BLOCKS: u32 = 1000;
 
-/// A regular polygon, gone round some times without a stop.
+/// An axis of the plane.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PlaneAxis {
+    /// The first.
+    #[default]
+    X,
+    /// The second.
+    Y,
+}
+
+impl PlaneAxis {
+    /// Its letter.
+    pub fn letter(self) -> char {
+        match self {
+            Self::X => 'X',
+            Self::Y => 'Y',
+        }
+    }
+
+    /// Angle from +X, rad.
+    fn angle_rad(self) -> f64 {
+        match self {
+            Self::X => 0.0,
+            Self::Y => FRAC_PI_2,
+        }
+    }
+}
+
+/// A regular polygon, gone round some times without a stop. One of two corners is a stroke: a line there and back.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Polygon {
     /// Corners.
@@ -24,6 +58,8 @@ pub struct Polygon {
     pub side_mm: f64,
     /// How often it is gone round.
     pub rounds: u32,
+    /// The axis along which its first side points.
+    pub along: PlaneAxis,
 }
 
 /// A polygon and the time it took.
@@ -48,16 +84,22 @@ impl Polygon {
         TAU / f64::from(self.corners)
     }
 
+    /// Whether it is a line there and back, which moves one axis alone.
+    pub fn is_stroke(&self) -> bool {
+        self.corners == STROKE
+    }
+
     /// Number of blocks.
     pub fn blocks(&self) -> u32 {
         self.corners * self.rounds
     }
 
-    /// Corners around a centre, mm, the first side along +X and the turn to the left.
+    /// Corners around a centre, mm, the turn to the left.
     pub fn points_mm(&self, center_mm: [f64; 2]) -> impl Iterator<Item = [f64; 2]> {
         let (turn, radius) = (self.turn_rad(), self.radius_mm());
+        let first = self.along.angle_rad() - FRAC_PI_2 - turn / 2.0;
         (0..self.corners).map(move |k| {
-            let angle = f64::from(k) * turn - std::f64::consts::FRAC_PI_2 - turn / 2.0;
+            let angle = f64::from(k) * turn + first;
             [
                 center_mm[0] + radius * angle.cos(),
                 center_mm[1] + radius * angle.sin(),
@@ -72,9 +114,9 @@ impl Polygon {
 
     /// Its blocks.
     pub fn elements(&self, feed_mm_per_s: f64) -> impl Iterator<Item = Element> {
-        let (turn, side_mm) = (self.turn_rad(), self.side_mm);
+        let (turn, side_mm, first) = (self.turn_rad(), self.side_mm, self.along.angle_rad());
         let round: Vec<_> = (0..self.corners)
-            .map(|k| Element::line(side_mm, f64::from(k) * turn, feed_mm_per_s))
+            .map(|k| Element::line(side_mm, first + f64::from(k) * turn, feed_mm_per_s))
             .collect();
         let count = self.blocks() as usize;
         round.into_iter().cycle().take(count)

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use tandem_estimate::diagnose::{Evidence, Fitted, MIN_R2, fit_all, linear};
 use tandem_estimate::experiment::Experiment;
 use tandem_estimate::measurements::parse_log;
-use tandem_estimate::polygon::{CORNERS, Polygon, SIDES_MM, Timed};
+use tandem_estimate::polygon::{CORNERS, PlaneAxis, Polygon, SIDES_MM, Timed};
 use tandem_estimate::{Choice, Rule};
 use tandem_host::Clock;
 use tandem_rig::Random;
@@ -44,6 +44,7 @@ fn the_published_table_is_that_of_an_overlap_control() {
                 corners: n as u32,
                 side_mm: 2.0 * half,
                 rounds: rounds as u32,
+                along: PlaneAxis::X,
             };
             Timed {
                 polygon,
@@ -146,6 +147,7 @@ fn a_control_whose_axes_are_unequal_is_found_from_noisy_readings() {
                     corners,
                     side_mm,
                     rounds: 2000 / corners,
+                    along: PlaneAxis::X,
                 },
                 feed_mm_per_s: 5000.0 / 60.0,
                 time_s: 1.0,
@@ -183,6 +185,15 @@ fn a_control_whose_axes_are_unequal_is_found_from_noisy_readings() {
     }
 }
 
+/// The line of the comment before the first stroke.
+fn line_before_strokes(experiment: &Experiment) -> u32 {
+    let text = experiment.program(true);
+    let at = text
+        .lines()
+        .position(|line| line.contains("there and back"));
+    at.unwrap() as u32 + 1
+}
+
 #[test]
 fn a_log_of_lines_gives_the_times_of_the_polygons_without_what_lies_between_them() {
     let experiment = Experiment::new(&mill(&[]), 20).unwrap();
@@ -209,6 +220,12 @@ fn a_log_of_lines_gives_the_times_of_the_polygons_without_what_lies_between_them
         let what = format!("{:?}", timed.polygon);
         assert_near(timed.time_s, expected, 1e-6, &what);
     }
+    // A program that was written before there were strokes ends where they begin now.
+    let first_stroke = line_before_strokes(&experiment);
+    let before = rows.partition_point(|row| row.line <= first_stroke);
+    let round = experiment.timed(&rows[..before]).unwrap();
+    assert_eq!(round.len(), CORNERS.len() * SIDES_MM.len());
+    assert_eq!(round[..], timed[..round.len()]);
     let half = &rows[..rows.len() / 2];
     let refused = experiment.timed(half).unwrap_err();
     assert!(refused.contains("polygons are in the log"), "{refused}");

@@ -6,7 +6,7 @@ use tandem_estimate::diagnose::{Fitted, fit_all};
 use tandem_estimate::experiment::Experiment;
 use tandem_estimate::measurements;
 use tandem_estimate::planned::{Bench, Planned, PlannerKind, fit};
-use tandem_estimate::polygon::{Polygon, Timed};
+use tandem_estimate::polygon::{PlaneAxis, Polygon, Timed};
 use tandem_estimate::{Choice, estimate, model_file};
 use tandem_gcode::Program;
 use tandem_host::{Clock, Registry, Switches};
@@ -217,6 +217,7 @@ fn axes_of_unequal_acceleration_are_told_apart() {
             corners,
             side_mm,
             rounds: 120 / corners,
+            along: PlaneAxis::X,
         },
         feed_mm_per_s: 5000.0 / 60.0,
         time_s: 1.0,
@@ -241,6 +242,43 @@ fn axes_of_unequal_acceleration_are_told_apart() {
     }
 }
 
+/// Two unequal axes that are exchanged leave the times of polygons nearly as they are, and not those of strokes.
+#[test]
+fn strokes_tell_which_axis_is_the_weaker_one() {
+    let (own, registry) = (machine(&[]), with_planners());
+    let experiment = Experiment::new(&own, 24).unwrap();
+    let round = |p: &&Polygon| p.corners >= 8 && p.corners <= 18 && p.side_mm >= 1.0;
+    let (strokes, rounds): (Vec<_>, Vec<_>) = experiment
+        .polygons
+        .iter()
+        .filter(|p| p.is_stroke() || round(p))
+        .map(|polygon| Timed {
+            polygon: *polygon,
+            feed_mm_per_s: experiment.feed_mm_per_s,
+            time_s: 1.0,
+            reading_error_s: 0.0,
+        })
+        .partition(|timed| timed.polygon.is_stroke());
+    let mut real = Planned::of(&own, PlannerKind::Smooth);
+    real.acceleration_mm_per_s2[..2].copy_from_slice(&[500.0, 1500.0]);
+    real.jerk_mm_per_s3[..2].copy_from_slice(&[10_000.0, 30_000.0]);
+    let mut exchanged = real.clone();
+    exchanged.acceleration_mm_per_s2.swap(0, 1);
+    exchanged.jerk_mm_per_s3.swap(0, 1);
+    let ratios = |timed: &[Timed]| -> Vec<f64> {
+        let bench = Bench::new(&own, &registry, timed, 24).unwrap();
+        let times = [&real, &exchanged].map(|planned| bench.times_s(planned).unwrap());
+        let pairs = times[0].iter().zip(&times[1]);
+        pairs.map(|(one, other)| one / other).collect()
+    };
+    let (strokes, rounds) = (ratios(&strokes), ratios(&rounds));
+    println!("{strokes:?} {rounds:?}");
+    assert_eq!((strokes.len(), rounds.len()), (12, 12));
+    assert!(strokes[..6].iter().all(|ratio| *ratio > 1.1));
+    assert!(strokes[6..].iter().all(|ratio| *ratio < 0.9));
+    assert!(rounds.iter().all(|ratio| (ratio - 1.0).abs() < 0.1));
+}
+
 #[test]
 fn readings_say_how_far_they_may_be_off() {
     let text = "n,side_mm,repetitions,seconds,reading_error_s\n3,0.1,10,1,0.1\n4,0.1,10,1,\n5,0.1,10,1,0.001\n\
@@ -260,6 +298,27 @@ fn readings_say_how_far_they_may_be_off() {
         refused.starts_with("readings.csv:2: reading_error_s: 2"),
         "{refused}"
     );
+    let strokes = "n,side_mm,repetitions,seconds,axis\n3,0.1,10,1,\n4,0.1,10,1,\n5,0.1,10,1,\n6,0.1,10,1,\n2,8,10,1,X\n2,8,10,1,y\n";
+    let timed = measurements::parse("strokes.csv", strokes.as_bytes()).unwrap();
+    assert_eq!(timed[4].polygon.along, PlaneAxis::X);
+    assert_eq!(timed[5].polygon.along, PlaneAxis::Y);
+    for (from, to, words) in [
+        ("1,y", "1,", "strokes.csv:7: axis: \"\" is neither"),
+        (
+            "3,0.1,10,1,",
+            "3,0.1,10,1,Y",
+            "strokes.csv:2: axis: \"Y\" belongs to",
+        ),
+        (
+            "2,8,10,1,X",
+            "1,8,10,1,X",
+            "strokes.csv:6: n: a polygon has 2 corners",
+        ),
+    ] {
+        let refused = measurements::parse("strokes.csv", strokes.replace(from, to).as_bytes());
+        let refused = refused.unwrap_err();
+        assert!(refused.starts_with(words), "{refused}");
+    }
     let rows =
         "turn_deg,feed_mm_per_min,min_feed_mm_per_min,reading_error_mm_per_min\n60,2000,1755,20\n";
     let corner = measurements::parse_corners("corners.csv", rows.as_bytes()).unwrap()[0];
