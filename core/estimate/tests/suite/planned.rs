@@ -157,7 +157,7 @@ fn a_control_that_bounds_jerk_is_found_from_noisy_readings() {
             if !every() {
                 experiment
                     .polygons
-                    .retain(|p| p.corners <= 36 && p.side_mm <= 2.0);
+                    .retain(|p| p.is_stroke() || p.corners <= 36 && p.side_mm <= 2.0);
             }
             let measured = experiment.run(real, &registry, Clock::Virtual).unwrap();
             let read = |timed: &Timed| Timed {
