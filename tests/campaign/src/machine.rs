@@ -125,9 +125,16 @@ pub struct Drawn {
     pub max_feed_ratio: f64,
     /// How long a filter behind the interpolation takes to settle at each rest, ms; 0 where that is no longer than its window.
     pub settling_ms: f64,
+    /// Time constant of a block at the start of a program, ms.
+    pub constant_ms: f64,
+    /// Every block takes its time constant, however short it is: corners are not controlled.
+    pub keeps_constant: bool,
     /// What there is to probe.
     pub probe: Option<Surface>,
 }
+
+/// Time constant of a block where the machine file states none, ms.
+const DEFAULT_CONSTANT_MS: f64 = 50.0;
 
 /// A number with four significant digits: what somebody would write.
 pub fn rounded(value: f64) -> f64 {
@@ -208,6 +215,8 @@ pub fn draw(random: &mut Random, planner: Option<Planner>) -> Drawn {
         rough_ms,
         max_feed_ratio,
         settling_ms: 0.0,
+        constant_ms: DEFAULT_CONSTANT_MS,
+        keeps_constant: false,
         probe: None,
     };
     drawn.text.key("format", 1);

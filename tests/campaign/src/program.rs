@@ -66,11 +66,17 @@ pub fn draw(random: &mut Random, machine: &Drawn) -> (String, f64) {
     (text, budget_s - program.left_s)
 }
 
-/// The lines of `text` up to where the rests between them would take longer to settle than a run may be.
+/// The lines of `text` up to where the rests between them would take longer to settle than a run may be, or the time constants of
+/// blocks that keep theirs: one to get faster, and one to slow down.
 fn settling_in_time(text: &str, machine: &Drawn) -> String {
     let mut left_ms = SETTLING_SHARE * run::MAX_SAMPLES as f64 * machine.fine_ms;
-    let mut exact = false;
+    let (mut exact, mut constant_ms) = (false, machine.constant_ms);
     let settles = |line: &&str| {
+        if let Some(stated) = line.strip_prefix("TA") {
+            constant_ms = stated.parse().unwrap_or(constant_ms);
+        } else if machine.keeps_constant && line.contains(char::is_whitespace) {
+            left_ms -= 2.0 * constant_ms;
+        }
         exact = line.starts_with("G61") || (exact && !line.starts_with("G64"));
         let rests = ["G0", "G4", "G38", "M"]
             .iter()
@@ -350,12 +356,23 @@ mod tests {
     #[test]
     fn a_program_ends_before_its_rests_take_longer_to_settle_than_a_run_may() {
         let mut machine = crate::machine::draw(&mut Random::new(1), None);
+        machine.keeps_constant = false;
         machine.fine_ms = 1.0;
         machine.settling_ms = SETTLING_SHARE * run::MAX_SAMPLES as f64 / 3.5;
         let text = "G1 X1\nG61\nG1 X2\nG64\nG1 X3\nG0 X4\nG1 X5\nM8\nG1 X6\n";
         let kept = "G1 X1\nG61\nG1 X2\nG64\nG1 X3\nG0 X4\nG1 X5\n";
         assert_eq!(settling_in_time(text, &machine), kept);
         machine.settling_ms = 0.0;
+        machine.keeps_constant = false;
         assert_eq!(settling_in_time(text, &machine), text);
+        machine.keeps_constant = true;
+        machine.constant_ms = 1e-3;
+        assert_eq!(settling_in_time(text, &machine), text);
+        let longer = format!(
+            "G1 X1\nTA{}\n{text}",
+            SETTLING_SHARE * run::MAX_SAMPLES as f64 / 5.0
+        );
+        let kept = longer.find("G1 X3").unwrap();
+        assert_eq!(settling_in_time(&longer, &machine), longer[..kept]);
     }
 }

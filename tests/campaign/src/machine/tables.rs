@@ -34,10 +34,8 @@ impl Drawn {
         }
         text.key("max_feed_ratio", self.max_feed_ratio);
         if random.below(2) == 0 {
-            text.key(
-                "time_constant_ms",
-                rounded(random.length(self.fine_ms.max(1.0), 300.0)),
-            );
+            self.constant_ms = rounded(random.length(self.fine_ms.max(1.0), 300.0));
+            text.key("time_constant_ms", self.constant_ms);
         }
         if !self.planner.keeps_jerk() {
             text.key("jerk", "\"report\"");
@@ -170,6 +168,7 @@ impl Drawn {
                 }
                 if random.below(6) == 0 {
                     options.push(("corner_control", "\"off\"".to_string()));
+                    self.keeps_constant = true;
                 }
             }
             Planner::AfterInterpolation => {
