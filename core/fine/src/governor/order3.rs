@@ -12,7 +12,7 @@ use super::way_below::Below;
 use super::{Aim, Goal, Governor};
 use crate::horizon::Horizon;
 use crate::law::{stop_s, to_rest};
-use crate::plan_ahead::PlanCursor;
+use crate::plan_ahead::{Pace, PlanCursor};
 use crate::steps::{Recent, Steps};
 
 /// What was chosen for the period.
@@ -59,7 +59,7 @@ impl Governor {
             }
         };
         let chosen = self.choose_change(wanted, here, below.as_mut(), &aim.goal, horizon);
-        self.end_approach(aim, horizon);
+        self.end_approach(aim, horizon, place, chosen.delta_s);
         chosen
     }
 
@@ -196,15 +196,27 @@ impl Governor {
         }
     }
 
-    /// Ends an approach: what rounding leaves of it is far below what a period may change.
-    fn end_approach(&mut self, aim: &Aim, horizon: &Horizon) {
+    /// Ends an approach: what rounding leaves of it is far below what a period may change. The feed is not, where the plan at the end of
+    /// the period, `delta_s` behind its `place`, would be beyond it: there σ stays as it was chosen.
+    fn end_approach(
+        &mut self,
+        aim: &Aim,
+        horizon: &Horizon,
+        mut place: PlanCursor<'_>,
+        delta_s: f64,
+    ) {
         let h = self.period_s;
         let most = SNAP_SHARE * horizon.rate_change_per_s2.min(1.0 / (h * h)) * h;
         let target = match aim.goal {
             Goal::Rest { .. } => 0.0,
             Goal::Run { sigma, .. } => sigma,
         };
-        if (self.sigma - target).abs() < most * h && self.rate_per_s.abs() < most {
+        if (self.sigma - target).abs() >= most * h || self.rate_per_s.abs() >= most {
+            return;
+        }
+        place.go(delta_s);
+        let is_kept = |pace: Pace| target * pace.speed <= aim.goal.speed_mm_per_s();
+        if target <= self.sigma || place.pace().is_none_or(is_kept) {
             (self.sigma, self.rate_per_s) = (target, 0.0);
         }
     }
@@ -445,6 +457,37 @@ pub(super) mod tests {
         assert!((980.0..=1000.0).contains(&driven), "{driven} mm/s²");
         let jerk = 3.0 * acceleration * 0.95 * 2.5 + speed * (rate - 2.5) / PERIOD_S;
         assert!((-60_000.0..-11_000.0).contains(&jerk), "{jerk} mm/s³");
+    }
+
+    /// Where a period may change much of the rate, the end of its approach to 1 is not taken where the plan is a little faster than the feed.
+    #[test]
+    fn the_end_of_an_approach_keeps_the_feed() {
+        const SPEED: f64 = 0.0255;
+        let limits = limits(17_000.0, 1e6);
+        let segment = along_x([SPEED, 0.0, 0.0], 10.0);
+        let mut horizon = Horizon::new(&limits, 2, PERIOD_S);
+        horizon.fill(&Ahead::new(&segment, Some(0.0), 0, None), PERIOD_S);
+        for (over, ends_at_1) in [(1e-5, false), (-1e-5, true)] {
+            let feed = SPEED * (1.0 - over);
+            let aim = Aim {
+                goal: Goal::run(1.0, feed, None),
+                ratio: 1.0,
+                kept_rate: 0.9,
+                path: [SPEED, 0.0, 0.0],
+            };
+            let mut governor = Governor::new(&limits, 2, PERIOD_S);
+            governor.jump(0.999);
+            let mut at_s = 0.0;
+            for _ in 0..60 {
+                let ahead = Ahead::new(&segment, Some(at_s), 0, None);
+                let place = ahead.place(TWO_LINEAR);
+                at_s += governor
+                    .smooth(&aim, &horizon, place, Recent::default())
+                    .delta_s;
+                assert!(governor.sigma() * SPEED <= feed.min(SPEED) * (1.0 + 1e-7));
+            }
+            assert_eq!(governor.sigma() == 1.0, ends_at_1);
+        }
     }
 
     proptest! {
