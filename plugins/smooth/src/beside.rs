@@ -349,4 +349,45 @@ mod tests {
             }
         }
     }
+
+    /// Back by more than the tolerance in the first half of the time, or in the second, though both ends are on the path.
+    #[test]
+    fn a_motion_that_goes_back_in_either_half_is_too_far_off() {
+        let chords = path(&mut Random::new(1), 0.0, 0.05);
+        let run = open(&chords);
+        let direction = chords[0].direction;
+        for (x, passes) in [
+            ([0.0, 3.2, -3.0], false),
+            ([0.9, -3.2, 3.2], false),
+            ([0.1, 0.5, 0.3], true),
+        ] {
+            let mut piece = Piece::between(&[[0.0; 2]; 3], &[[0.0; 2]; 3], 0.0, 1.0);
+            for (n, x) in x.into_iter().enumerate() {
+                piece.c[n] = each(|l| x * direction[l]);
+            }
+            let window = window(piece);
+            let places = [0.0, 1.0].map(|t| beside(&run, 0, &window.state(t)[0]));
+            let ends = (&places[0], &places[1]);
+            let off = closer(&run, &window, [0.0, 1.0], ends, 0.0, HALVINGS);
+            assert_eq!(off < FAR, passes, "{x:?}: {off}");
+        }
+    }
+
+    /// Where the path itself turns back, the place that a motion goes back to may be one that is passed at another time.
+    #[test]
+    fn next_to_a_turn_of_the_path_nothing_goes_back() {
+        for (turned, goes_back) in [(None, true), (Some(0), false), (Some(2), false)] {
+            let mut chords = path(&mut Random::new(1), 0.0, 0.05);
+            if let Some(turned) = turned {
+                chords[turned].direction = chords[1].direction.map(|d| -d);
+            }
+            let run = open(&chords);
+            let at = |s: f64| beside(&run, 1, &chords[1].at(chords[1].s + s));
+            assert_eq!(
+                turns_back(&run, &at(0.7), &at(0.4)),
+                goes_back,
+                "{turned:?}"
+            );
+        }
+    }
 }

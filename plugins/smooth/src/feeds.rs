@@ -119,6 +119,7 @@ impl<const L: usize> Feeder<'_, L> {
 mod tests {
     use super::*;
     use crate::order::tests::{lines, open};
+    use crate::timing::Mark;
 
     /// Chords of 1 mm each with these feeds, and waypoints at these places in these intervals.
     fn asked(feeds: &[f64], waypoints: &[(f64, u32)], intervals: usize) -> Vec<f64> {
@@ -170,5 +171,32 @@ mod tests {
         assert_eq!(asked(&feeds, &[(3.1, 0), (3.5, 1)], 2), [90.0, 90.0]);
         // Without waypoints the lowest of all counts.
         assert_eq!(asked(&feeds, &[], 2), [20.0, 20.0]);
+    }
+
+    /// A piece that ends where a chord begins does not touch that one.
+    #[test]
+    fn a_piece_has_the_feeds_of_the_chords_that_it_touches() {
+        let mut chords = lines(&[[0.0, 0.0], [5.0, 0.0], [7.0, 0.0], [10.0, 0.0]]);
+        for (chord, feed) in chords.iter_mut().zip([50.0, 20.0, 70.0]) {
+            chord.feed = feed;
+        }
+        let run = open(&chords);
+        let mut window = Window::<2>::new();
+        let mut marks = vec![Mark { t: 0.0, s: 0.0 }];
+        for (t, s) in [(1.0, 5.0), (2.0, 6.0), (3.0, 10.0)] {
+            let rest = [[0.0; 2]; 3];
+            window
+                .pieces
+                .push(Piece::between(&rest, &rest, t - 1.0, 1.0));
+            marks.push(Mark { t, s });
+        }
+        window.marks = marks;
+        let mut feeder = Feeder {
+            run: &run,
+            timer_at: 0,
+            chord: 0,
+        };
+        let ranges = [0, 1, 2].map(|n| feeder.range(&window, n));
+        assert_eq!(ranges, [(50.0, 50.0), (20.0, 20.0), (20.0, 70.0)]);
     }
 }

@@ -259,4 +259,36 @@ pub(crate) mod tests {
         let far = [[-5.0, 0.0], [0.7, 0.003], [2.0, 0.0]];
         assert!(order.walk(&run, &far, 1, (2, run.end())));
     }
+
+    /// A vertex is passed between the last sample that is before it at all events, and the first that is behind it.
+    #[test]
+    fn a_vertex_is_passed_between_the_samples_around_it() {
+        let chords = lines(&[[0.0, 0.0], [10.0, 0.0]]);
+        let samples: Vec<_> = (0..=10_u32).map(|n| [f64::from(n), 0.0]).collect();
+        let mut order = Order::default();
+        assert!(order.walk(&open(&chords), &samples, 0, (0, 10.0)));
+        let mut passed = [0; 2];
+        for (s, among) in [(0.5, (0, 0)), (4.5, (4, 4)), (5.0, (4, 5)), (9.5, (9, 9))] {
+            assert_eq!(order.around(s, &mut passed), among, "{s}");
+        }
+    }
+
+    /// From a line of little tolerance to one of much the corner may be cut as far as the larger allows.
+    #[test]
+    fn a_corner_is_near_by_the_larger_tolerance_of_its_lines() {
+        let samples = [[0.0, 0.0], [0.9, 0.0], [1.0, 0.1], [1.0, 1.0]];
+        for (tolerances, follows) in [
+            ([0.01, 0.1], true),
+            ([0.1, 0.01], true),
+            ([0.01, 0.01], false),
+        ] {
+            let mut chords = lines(&[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]);
+            for (chord, tolerance) in chords.iter_mut().zip(tolerances) {
+                chord.tolerance = tolerance;
+            }
+            let run = open(&chords);
+            let found = Order::default().walk(&run, &samples, 0, (0, run.end()));
+            assert_eq!(found, follows, "{tolerances:?}");
+        }
+    }
 }
