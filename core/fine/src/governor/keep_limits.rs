@@ -384,6 +384,35 @@ mod tests {
         assert_eq!(range(40.0, 0.53), range(40.0, 0.6));
     }
 
+    /// The acceleration of the plan rises to 900 mm/s² in the middle of the period and falls again: there half of the σ̈ of the period
+    /// has come together.
+    #[test]
+    fn the_middle_of_a_period_counts_as_far_as_the_rate_has_come_there() {
+        let (sigma, peak, speed) = (0.9, 900.0, 100.0);
+        let whole_s = sigma * PERIOD_S;
+        let mut hump = Segment::rest(&AxisVector::ZERO, 1.0);
+        let (third, fourth) = (
+            4.0 * peak / whole_s / 6.0,
+            -4.0 * peak / whole_s / whole_s / 12.0,
+        );
+        hump.coefficients[0] = [0.0, speed, 0.0, third, fourth, 0.0];
+        hump.flags = SegmentFlags::default();
+        let mut limits = limits();
+        limits[0].jerk_mm_per_s3 = 1e9;
+        let way = RateState {
+            sigma,
+            rate_per_s: 0.0,
+            place: PlanAhead::new(&hump, [&[], &[]], TWO_LINEAR).begin(0.0),
+            recent: Recent::default(),
+        };
+        let horizon = Horizon::new(&limits, 2, PERIOD_S);
+        let range = WaySearch::new(PERIOD_S).range(&way, PERIOD_S, &horizon);
+        let left = ACCELERATION_SHARE * ACCELERATION - sigma * sigma * peak;
+        let expected = left / (speed * 0.5 * PERIOD_S);
+        let high = range.unwrap().high;
+        assert!((high / expected - 1.0).abs() < 0.05, "{high}, {expected}");
+    }
+
     proptest! {
         /// σ̈ at either end of the range keeps jerk and acceleration of both axes at every instant of the period, up to what the
         /// plan itself takes of them; and one of them is used up, so that no more could be taken.

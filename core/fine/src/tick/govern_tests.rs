@@ -165,3 +165,57 @@ fn a_rate_is_lowered_where_the_plan_is_above_what_is_allowed() {
     assert_eq!(within(10.0, 20.0), 0.5);
     assert_eq!(within(0.0, 20.0), 0.0);
 }
+
+/// Where the axes go a longer way than the path coordinate says, by a margin more than that; not where that is no measure of it.
+#[test]
+fn the_way_of_a_period_is_longer_by_what_the_axes_go_beyond_the_path() {
+    const SLIGHTLY: f64 = f64::midpoint(1.0, MAX_LONGER);
+    for (x_speed, expected) in [
+        (10.0, 1.0),
+        (
+            10.0 * SLIGHTLY,
+            1.0 + (1.0 + LONGER_MARGIN) * (SLIGHTLY - 1.0),
+        ),
+        (10.0 * MAX_LONGER + 1.0, 1.0),
+    ] {
+        let mut line = segment([1.0, 10.0, 0.0, 0.0, 0.0, 0.0], 10.0, 1.0);
+        line.coefficients[0][1] = x_speed;
+        let mut follower = follower(2, &[line]);
+        follower.cursor.advance(0.1, |_| false);
+        follower.governor.jump(0.5);
+        let longer = follower.longer();
+        assert!((longer - expected).abs() < 1e-9, "{x_speed}: {longer}");
+    }
+}
+
+/// The plan gets from 5 to 6 mm/s in a period, by way of 5.5 in the mean; the feed is 5.2.
+#[test]
+fn a_period_is_asked_for_its_end_and_for_its_mean() {
+    let line = segment([0.0, 4.0, 500.0, 0.0, 0.0, 0.0], 5.2, 1.0);
+    let mut follower = follower(2, &[line]);
+    follower.cursor.advance(0.001, |_| false);
+    for (delta_s, end, mean) in [(0.001, 6.0, 5.5), (0.000_5, 5.5, 5.25), (0.0, 5.2, 5.2)] {
+        let asked = follower.asked_of_period(delta_s, &AT_THE_FEED, f64::INFINITY);
+        assert!((asked.at_end - 5.2 / end).abs() < 1e-6, "{}", asked.at_end);
+        assert!((asked.mean - 5.2 / mean).abs() < 1e-6, "{}", asked.mean);
+    }
+    let asked = follower.asked_of_period(0.001, &AT_THE_FEED, 3.0);
+    assert!((asked.at_end - 3.0 / 6.0).abs() < 1e-9, "{}", asked.at_end);
+}
+
+/// With a jerk limit nothing is asked of the speed until braking may wait no longer.
+#[test]
+fn braking_for_a_place_ahead_waits_until_it_has_to_begin() {
+    let mut follower = follower(3, &[segment([0.0, 20.0, 0.0, 0.0, 0.0, 0.0], 20.0, 1.0)]);
+    follower.cursor.advance(0.1, |_| false);
+    follower.request = request(Ask::Run);
+    follower.horizon.fill(&follower.cursor.ahead(), PERIOD_S);
+    for end in [0.0, 5.0, 12.0] {
+        let way_mm = follower.along().way_to_mm(end);
+        let soon_mm = PERIOD_S * (BRAKING_PERIODS * 20.0 + SETTLING_PERIODS * end);
+        let begins_mm = follower.cursor.path_mm() + way_mm + soon_mm;
+        assert!(way_mm > 1e-3, "{way_mm}");
+        assert_eq!(follower.speed_towards(begins_mm + 1e-6, end), f64::INFINITY);
+        assert_eq!(follower.speed_towards(begins_mm - 1e-6, end), end);
+    }
+}

@@ -97,6 +97,39 @@ mod tests {
     }
 
     #[test]
+    fn so_many_periods_of_a_second_may_be_missed_and_so_many_in_a_row() {
+        let limits = Limits::new(&[AxisLimits::unlimited(); 3]).unwrap();
+        let mut config = FineConfig::new(0.001, limits);
+        (config.missed.share, config.missed.in_a_row) = (0.01, 4);
+        let mut missed = Missed::new(&config);
+        for number in 0..10 {
+            assert_eq!(missed.count(100 * number, 1), None, "{number}");
+            missed.begin_row();
+        }
+        let too_many = missed.count(999, 1);
+        assert!(matches!(
+            too_many,
+            Some(FaultKind::MissedPeriods {
+                missed: 11,
+                most: 10,
+                of_last: Some(1000)
+            })
+        ));
+        let mut missed = Missed::new(&config);
+        assert_eq!(missed.count(0, 3), None);
+        assert_eq!(missed.count(3, 1), None);
+        let in_a_row = missed.count(4, 1);
+        assert!(matches!(
+            in_a_row,
+            Some(FaultKind::MissedPeriods {
+                missed: 5,
+                most: 4,
+                of_last: None
+            })
+        ));
+    }
+
+    #[test]
     fn a_share_in_decimals_loses_no_period_by_its_last_bit() {
         // As numbers of the computer 0.29 of 100 is a little less than 29.
         assert_eq!(allowed(0.29, 0.01), 29);

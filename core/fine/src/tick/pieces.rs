@@ -136,3 +136,58 @@ fn piece_target(
         at_end
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tandem_sdk::AxisVector;
+
+    /// From 8 mm/s by way of a hump to 8 mm/s: 16 mm/s in the mean of 1 ms.
+    fn hump() -> Segment {
+        let mut segment = Segment::rest(&AxisVector::ZERO, 0.001);
+        segment.path = [0.0, 8.0, 24e3, -16e6, 0.0, 0.0];
+        segment.feed_mm_per_s = 8.0;
+        segment.flags = SegmentFlags::default();
+        segment
+    }
+
+    #[test]
+    fn a_piece_is_to_keep_the_feed_at_its_end_and_from_below_it_in_its_mean() {
+        let ratios = Ratios {
+            feed: 0.5,
+            mean_feed: 1.0,
+            rapid: 0.7,
+        };
+        let target = |segment: &Segment, sigma: f64, way_speed_mm_per_s: f64| {
+            let bounds = Bounds {
+                ratios: &ratios,
+                way_speed_mm_per_s,
+                limit: 1.0,
+            };
+            piece_target(segment, 0.0, 0.001, sigma, &bounds)
+        };
+        let near = |one: f64, other: f64| (one - other).abs() < 1e-9;
+        // The mean of σ and the target is half of one.
+        assert!(near(target(&hump(), 0.6, f64::INFINITY), 0.4));
+        assert!(near(target(&hump(), 0.9, f64::INFINITY), 0.1));
+        // Its end is what binds, by the feed or by a place ahead.
+        assert!(near(target(&hump(), 0.2, f64::INFINITY), 0.5));
+        assert!(near(target(&hump(), 0.2, 2.0), 0.25));
+        let above = Segment {
+            feed_mm_per_s: 4.0,
+            ..hump()
+        };
+        assert!(near(target(&above, 0.9, f64::INFINITY), 0.25));
+        let rapid = Segment {
+            flags: SegmentFlags::RAPID,
+            ..hump()
+        };
+        assert!(near(target(&rapid, 0.9, f64::INFINITY), 0.7));
+        assert!(near(target(&rapid, 0.9, 4.0), 0.5));
+        let stands = Segment {
+            path: [5.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            ..hump()
+        };
+        assert!(near(target(&stands, 0.9, f64::INFINITY), 1.0));
+    }
+}
