@@ -217,9 +217,8 @@ impl<'a> Body<'a> {
 mod tests {
     use super::*;
 
-    #[test]
-    fn a_body_whose_period_is_no_time_is_refused() {
-        let header = |fine_period_s| Header {
+    fn header(fine_period_s: f64) -> Header {
+        Header {
             fine_period_s,
             axes: Axes::new(&[('X', false)]).unwrap(),
             machine: "m".into(),
@@ -227,7 +226,27 @@ mod tests {
             planner: "look-ahead".into(),
             signals: vec![],
             dry_run: false,
-        };
+        }
+    }
+
+    /// The first format says nothing of dry runs.
+    #[test]
+    fn a_dry_run_is_known_from_the_second_format_on() {
+        let mut dry = header(0.001);
+        dry.dry_run = true;
+        let body = dry.body();
+        for format in 2..=FORMAT {
+            assert!(Header::parse(&body, format).unwrap().dry_run, "{format}");
+        }
+        assert!(!Header::parse(&header(0.001).body(), 2).unwrap().dry_run);
+        let (_, first) = body.split_last().unwrap();
+        assert!(!Header::parse(first, 1).unwrap().dry_run);
+        assert!(Header::parse(first, 2).is_err());
+        assert!(Header::parse(&body, 1).is_err());
+    }
+
+    #[test]
+    fn a_body_whose_period_is_no_time_is_refused() {
         assert!(Header::parse(&header(0.001).body(), FORMAT).is_ok());
         for none_s in [0.0, -0.001, f64::INFINITY, f64::NAN] {
             let parsed = Header::parse(&header(none_s).body(), FORMAT);

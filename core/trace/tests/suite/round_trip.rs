@@ -88,8 +88,10 @@ fn what_cannot_be_read_is_not_written() {
             .sample(&motion(1)[0].0, &[])
             .is_err()
     );
-    other.fine_period_s = f64::NAN;
-    assert!(Writer::new(vec![], &other).is_err());
+    for none_s in [f64::NAN, f64::INFINITY, 0.0, -0.001] {
+        other.fine_period_s = none_s;
+        assert!(Writer::new(vec![], &other).is_err(), "{none_s}");
+    }
     let mut long = header(3, 0);
     long.program = "x".repeat(1 << 17);
     assert!(Writer::new(vec![], &long).is_err());
