@@ -373,6 +373,18 @@ mod tests {
         }
     }
 
+    /// Where nothing is halved any more, half of the way between the ends counts, and what the motion can do in it.
+    #[test]
+    fn in_the_end_half_of_the_way_between_two_places_counts() {
+        let chords = path(&mut Random::new(1), 0.0, 0.5);
+        let run = open(&chords);
+        let place = |s: f64| beside(&run, 0, &chords[0].at(s));
+        let (from, to) = (place(0.2), place(0.6));
+        let off = closer(&run, &Window::new(), [0.0, 1.0], (&from, &to), 0.1, 0);
+        let expected = from.share.max(to.share) + (0.4 / 2.0 + 0.1) / (ALLOWED * 0.5);
+        assert!((off - expected).abs() < 1e-9, "{off}, {expected}");
+    }
+
     /// Where the path itself turns back, the place that a motion goes back to may be one that is passed at another time.
     #[test]
     fn next_to_a_turn_of_the_path_nothing_goes_back() {

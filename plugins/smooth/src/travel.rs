@@ -240,13 +240,18 @@ mod tests {
 
     #[test]
     fn a_path_beyond_an_end_may_be_followed_there_and_no_further() {
-        let chords = lines(&[[0.8, 0.6], [1.2, 0.9], [0.8, 0.6]]);
-        let around = |joints: bool| {
+        let around = |joints: bool, points: &[[f64; 2]]| {
+            let chords = lines(points);
             let travel = travel(joints);
             travel.around(&open(&chords), (0.0, 1.0), &chords[0].start)
         };
+        let low = around(false, &[[-0.8, 0.0], [-1.2, 0.0], [-0.8, 0.0]]).unwrap();
+        assert_near(
+            &[low.beyond(&[-1.2, 0.0]).max(0.0), low.beyond(&[-1.3, 0.0])],
+            &[0.0, 0.1],
+        );
         let beyond = [false, true].map(|joints| {
-            let travel = around(joints).unwrap();
+            let travel = around(joints, &[[0.8, 0.6], [1.2, 0.9], [0.8, 0.6]]).unwrap();
             [
                 travel.beyond(&[1.2, 0.9]).max(0.0),
                 travel.beyond(&[1.3, 1.2]),

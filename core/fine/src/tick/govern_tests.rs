@@ -219,3 +219,21 @@ fn braking_for_a_place_ahead_waits_until_it_has_to_begin() {
         assert_eq!(follower.speed_towards(begins_mm - 1e-6, end), end);
     }
 }
+
+/// The plan is twice as fast as the feed: the rate is to be low there where a lower one than planned is asked for, and only there.
+#[test]
+fn feeds_ahead_are_looked_at_where_less_is_asked_for_than_is_planned() {
+    let line = segment([0.0, 20.0, 0.0, 0.0, 0.0, 0.0], 10.0, 1.0);
+    let mut follower = follower(2, &[line]);
+    follower.cursor.advance(0.1, |_| false);
+    let planned = Ratios {
+        feed: 2.0,
+        mean_feed: 2.0,
+        ..AT_THE_FEED
+    };
+    for (ratios, rate) in [(AT_THE_FEED, 0.5), (planned, 1.0), (AT_THE_FEED, 0.5)] {
+        follower.look_at_feeds(&ratios);
+        let found = follower.governor.rate_in_time(0.001);
+        assert!((found - rate).abs() < 1e-6, "{ratios:?}: {found}");
+    }
+}

@@ -8,7 +8,7 @@ use tandem_rig::Random;
 use tandem_rings::{MachineState, RestCause};
 use tandem_sdk::{AxisVector, Edge, EventKind, StopOn};
 
-use crate::demanding::{self, ACCELERATION_MM_PER_S2, FEED_MM_PER_S, Script};
+use crate::demanding::{self, ACCELERATION_MM_PER_S2, FEED_MM_PER_S, PERIOD_S, Script};
 
 const JOINTS: usize = 2;
 pub const SPINDLE_RAD_PER_S: f64 = 100.0;
@@ -252,8 +252,19 @@ impl Bench {
         assert_eq!(self.told().velocity, AxisVector::ZERO);
     }
 
-    /// No setpoint went beyond a limit.
+    /// No setpoint went beyond a limit, and each says the speed that its place says.
     pub fn assert_limits(&self) {
+        for pair in self.script().told.windows(2) {
+            let ([before, told], joint) = ([&pair[0].0, &pair[1].0], 0);
+            if told.velocity[joint] != 0.0 && told.tick == before.tick + 1 {
+                let way = told.position[joint] - before.position[joint];
+                let rounding = 1e-9;
+                assert!(
+                    (way / PERIOD_S - told.velocity[joint]).abs() < rounding,
+                    "{told:?}"
+                );
+            }
+        }
         for (told, _) in &self.script().told {
             let most = ACCELERATION_MM_PER_S2 * (1.0 + 1e-6) + 1e-6;
             assert!(

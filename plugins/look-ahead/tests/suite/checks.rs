@@ -2,9 +2,9 @@
 
 use tandem_look_ahead::{Junction, LookAhead, Options};
 use tandem_rig::Collected;
-use tandem_sdk::{Accepted, AxisVector, Block, BlockKind, Planner};
+use tandem_sdk::{Accepted, AxisVector, Block, BlockKind, Planner, PlannerContext};
 
-use crate::common::context;
+use crate::common::{context, run};
 
 #[test]
 fn curves_are_left_to_the_planner_that_drives_them() {
@@ -67,6 +67,28 @@ fn a_block_that_is_driven_does_not_wait_for_others() {
         assert!(
             (advanced.duration_s - 0.002).abs() < 1e-12,
             "call {call}: {advanced:?}"
+        );
+    }
+}
+
+/// Up to the highest feed ratio a line is planned, at the feed of the axes at most; a rapid has no part in it.
+#[test]
+fn a_line_is_planned_at_the_highest_ratio_of_its_feed() {
+    let to = AxisVector::from_slice(&[50.0, 0.0, 0.0]);
+    for (max_feed_ratio, feed, speed) in [(1.0, 10.0, 10.0), (2.0, 10.0, 20.0), (2.0, 200.0, 250.0)]
+    {
+        let machine = PlannerContext {
+            max_feed_ratio,
+            ..context(&[1000.0; 3], 0.0, 0.001)
+        };
+        let line = tandem_rig::line(&AxisVector::ZERO, &to, feed);
+        let driven = run(&machine, &Options::default(), &[line], 0.01);
+        let top = f64::min(speed, f64::sqrt(1000.0 * 50.0));
+        let shortest_s = 50.0 / top + top / 1000.0;
+        let took = driven.duration_s() / shortest_s;
+        assert!(
+            (took - 1.0).abs() < 0.01,
+            "{max_feed_ratio}, {feed}: {took}"
         );
     }
 }
