@@ -16,6 +16,8 @@ use crate::{
 
 /// Chords whose sum is the length of a piece of a curve.
 const CHORDS: u32 = 64;
+/// What is shorter is the rounding of a sum of distances, and no motion; mm or degrees.
+const NO_MOVE: f64 = 1e-10;
 /// Arcs are cut into pieces so that none is mistaken for its chord.
 const GREATEST_SWEEP_RAD: f64 = PI / 8.0;
 
@@ -50,7 +52,7 @@ impl State<'_> {
         }
         let shapes = match motion {
             Motion::Arc { clockwise } => pieces(&arc::build(self, line, &target, clockwise)?),
-            _ if target == self.position => Vec::new(),
+            _ if is_rounding(&minus(&target, &self.position)) => Vec::new(),
             _ => vec![Shape::Line(path::Line::new(self.position, target))],
         };
         self.append(shapes, motion, number)?;
@@ -175,4 +177,8 @@ fn pieces(arc: &path::Arc) -> Vec<Shape> {
     (0..count)
         .map(|index| Shape::Arc(arc.part(fraction(index), fraction(index + 1))))
         .collect()
+}
+
+fn is_rounding(way: &Position) -> bool {
+    way.iter().all(|by| by.abs() < NO_MOVE)
 }

@@ -310,6 +310,23 @@ fn motion_to_and_fro_within_a_period_is_followed_to_its_end() {
     assert_finds(&judged(26.5), &[Kind::NotCovered]);
 }
 
+/// 0.362 − 0.0003 is not 0.3617 by a rounding: no motion is between them, and no exact stop.
+#[test]
+fn where_distances_add_up_to_where_the_machine_is_nothing_moves() {
+    let program =
+        |end: &str| format!("F600\nG1 X0.362\nG91\nX-0.0003\nG90\nG61\nX{end}\nX0.3\nM2\n");
+    let motion = stop_at_all(
+        &[at(0.0, 0.0, 0.0), at(0.362, 0.0, 0.0), at(0.3, 0.0, 0.0)],
+        10.0,
+        900.0,
+    );
+    assert_passes(&verdict(&motion, &program("0.3617")));
+    assert_finds(
+        &verdict(&motion, &program("0.36169")),
+        &[Kind::VertexMissed],
+    );
+}
+
 #[test]
 fn stopping_and_going_back_a_little_is_off_the_order_of_travel() {
     let back = [
