@@ -49,17 +49,18 @@ impl Interval {
     }
 
     /// Keeps the acceleration `q″σ² + q′σ̇` of an axis within `left`, or what the plan itself takes of it there. `motion` is its
-    /// velocity and acceleration in the plan.
+    /// velocity and acceleration in the plan. Without σ̈ the rate may come to more than 1, where σ̈ is to bring it down.
     #[inline]
     pub(super) fn keep_acceleration(&mut self, motion: [f64; 2], at: &RateAt, left: f64) {
         let [velocity, acceleration] = motion;
         let planned = at.sigma * at.sigma * acceleration;
+        let rate = at.sigma.min(1.0);
         // σ̈ acts on σ̇ and, where a period is long beside the change of the acceleration, on σ² as well.
         let passed_s = at.part * at.period_s;
         self.keep(
             planned + velocity * at.rate_per_s,
             (velocity + at.sigma * acceleration * passed_s) * passed_s,
-            left.max(planned.abs()),
+            left.max((rate * rate * acceleration).abs()),
         );
     }
 
@@ -125,6 +126,26 @@ mod tests {
             let off = (driven.abs() - most).abs() / most;
             assert!(off < 2e-3, "{driven} mm/s² of {most}");
         }
+    }
+
+    /// The rate would go beyond 1 within the period and is brought down to less than it was: what it would have been there is no part of what
+    /// is driven.
+    #[test]
+    fn acceleration_is_kept_where_a_rise_beyond_the_end_of_the_range_is_turned_round() {
+        let (velocity, acceleration, most) = (626.0, -191_900.0, 191_700.0_f64);
+        let (sigma, rate_per_s, period_s) = (0.9917, 19.9, 0.0016);
+        let at = RateAt {
+            sigma: sigma + rate_per_s * period_s,
+            rate_per_s,
+            part: 1.0,
+            period_s,
+        };
+        let mut interval = Interval::ALL;
+        interval.keep_acceleration([velocity, acceleration], &at, most);
+        let end = at.sigma + interval.low * period_s * period_s / 2.0;
+        let rate = rate_per_s + interval.low * period_s;
+        let driven = end * end * acceleration + rate * velocity;
+        assert!(driven > -1.005 * most, "{driven} mm/s² of {most}");
     }
 
     /// The jerk of an axis at the ends of the interval is what is left of the limit, or a little more than the plan itself takes, and

@@ -252,12 +252,14 @@ impl WaySearch {
         keep: &mut Interval,
     ) {
         let h = self.period_s;
+        let sigma = (way.sigma + part * time_s * way.rate_per_s).max(0.0);
         let at = RateAt {
-            sigma: (way.sigma + part * time_s * way.rate_per_s).clamp(0.0, 1.0),
+            sigma: sigma.min(1.0),
             rate_per_s: way.rate_per_s,
             part,
             period_s: time_s,
         };
+        let unturned = RateAt { sigma, ..at };
         // Between the points of some periods more may be used than at them.
         let share = if time_s > h {
             FEED_WAY_LIMIT_SHARE
@@ -272,7 +274,7 @@ impl WaySearch {
             keep.keep_jerk(planned, &at, (left, jerk_limit), 0.0);
             let left = share * ACCELERATION_SHARE * acceleration_limit
                 - reserve.acceleration_mm_per_s2(axis, at.sigma, h);
-            keep.keep_acceleration([velocity, acceleration], &at, left);
+            keep.keep_acceleration([velocity, acceleration], &unturned, left);
         }
     }
 }
