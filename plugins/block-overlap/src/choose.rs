@@ -211,3 +211,82 @@ fn flow_mm_per_s(item: &Item<'_>, corner: &Corner, next: &Item<'_>) -> [f64; 2] 
 fn is_free(item: &Item<'_>, next: &Item<'_>, flow_mm_per_s: [f64; 2]) -> bool {
     flow_mm_per_s[0] >= item.own_mm_per_s && flow_mm_per_s[1] >= next.own_mm_per_s
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A block of this slope, s²/mm, that is as fast as `reach_mm_per_s`.
+    fn block(slope_s2_per_mm: f64) -> Entry {
+        Entry {
+            slope_s2_per_mm,
+            ..Entry::blank()
+        }
+    }
+
+    fn item(block: &Entry, reach_mm_per_s: f64) -> Item<'_> {
+        Item {
+            block,
+            own_mm_per_s: 50.0,
+            reach_mm_per_s,
+            ramped_mm_per_s: 40.0,
+            fixed: false,
+        }
+    }
+
+    /// 20 ms of overlap, and 5 mm of room, which 250 mm/s would take.
+    fn corner() -> Corner {
+        Corner {
+            room_mm: 5.0,
+            longest_s: 0.02,
+            cap_mm_per_s: 100.0,
+            spare: 1.0,
+            ..Corner::default()
+        }
+    }
+
+    #[test]
+    fn the_faster_of_two_blocks_is_as_fast_as_its_axes_may_change_in_the_overlap() {
+        // 1000 and 500 mm/s² change by 20 and by 10 mm/s in 20 ms.
+        let (quick, slow) = (block(1e-3), block(2e-3));
+        for (reach, expected) in [
+            ([30.0, 90.0], [30.0, 40.0]),
+            ([90.0, 30.0], [50.0, 30.0]),
+            ([30.0, 33.0], [30.0, 33.0]),
+            ([33.0, 30.0], [33.0, 30.0]),
+            ([60.0, 60.0], [60.0, 60.0]),
+            ([150.0, 120.0], [100.0, 100.0]),
+        ] {
+            let found = flow_mm_per_s(&item(&quick, reach[0]), &corner(), &item(&slow, reach[1]));
+            for (found, expected) in found.into_iter().zip(expected) {
+                assert!((found - expected).abs() < 1e-9, "{reach:?}: {found}");
+            }
+        }
+    }
+
+    #[test]
+    fn full_overlap_needs_room_and_a_block_that_is_joined_its_feed() {
+        let entry = block(1e-3);
+        let (free, open) = (item(&entry, 50.0), corner());
+        assert_eq!(free.possible(&open, 10.0), [true, true]);
+        let rest = Corner { rest: true, ..open };
+        let closed = Corner {
+            cap_mm_per_s: 0.0,
+            ..open
+        };
+        for corner in [rest, closed] {
+            assert_eq!(free.possible(&corner, 50.0), [false, true]);
+        }
+        let fixed = Item {
+            fixed: true,
+            ..free
+        };
+        assert_eq!(fixed.possible(&open, 50.0), [true, false]);
+        assert_eq!(fixed.possible(&open, 49.0), [false, false]);
+        let ramped = Item {
+            ramped_mm_per_s: 50.0,
+            ..fixed
+        };
+        assert_eq!(ramped.possible(&open, 49.0), [false, true]);
+    }
+}

@@ -235,3 +235,15 @@ fn constant_s(taken: &Taken) -> f64 {
         taken.join.down_s
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_block_is_passed_at_the_part_of_its_feed_that_its_ramp_has_come_to() {
+        assert_eq!(passing(60.0, 0.01, 0.04), 15.0);
+        assert_eq!(passing(60.0, 0.04, 0.04), 60.0);
+        assert_eq!(passing(60.0, 0.0, 0.0), 0.0);
+    }
+}

@@ -19,7 +19,8 @@ const MARGIN: f64 = 0.999;
 /// Steps below this are rounding of the directions, not corners.
 const STRAIGHT: f64 = 1e-9;
 
-/// Most of an axis' acceleration that the constant form of the junction cost may take.
+/// Most of an axis' acceleration that the constant form of the junction cost may take. With all of it a circle of fine chords is not driven
+/// at its centripetal speed any more (`a_circle_of_fine_chords_is_driven_at_its_centripetal_speed`); half of it breaks no promise.
 const CONSTANT_SHARE: f64 = 0.5;
 
 /// The junction rule with the limits it needs.
