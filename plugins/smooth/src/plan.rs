@@ -118,6 +118,12 @@ impl<const L: usize> Start<'_, L> {
     }
 }
 
+/// Largest factor on the step in the rounds before the last of a window in motion: of these nothing but the timing is left, and most of
+/// that is of the window before. From rest there is more to be found, and a coarse grid misses it.
+const COARSEST: f64 = 1.75;
+/// Step that is not made longer, s: where it is so short, the motion changes more within a step than the grid can follow as it is.
+const SHORT_S: f64 = 2.2e-3;
+
 /// Part of what is left of the window before whose timing is taken over.
 const WARM: f64 = 0.55;
 
@@ -339,7 +345,13 @@ impl<const L: usize> Planning<L> {
         last: bool,
     ) -> bool {
         let total_s = self.marks[self.marks.len() - 1].t;
-        let intervals = ((total_s / self.step_s).ceil() as usize).clamp(INTERVALS.0, INTERVALS.1);
+        let coarser = if last || start.old.is_none() {
+            1.0
+        } else {
+            (self.step_s / SHORT_S).clamp(1.0, COARSEST)
+        };
+        let step_s = coarser * self.step_s;
+        let intervals = ((total_s / step_s).ceil() as usize).clamp(INTERVALS.0, INTERVALS.1);
         let grid = Grid {
             intervals,
             step_s: total_s / intervals as f64,
