@@ -453,6 +453,12 @@ impl PlanFollower {
             sigma = allowed.max((sigma * allowed).sqrt() * (1.0 - 1e-9));
         }
         let allowed = self.rate_below(sigma * self.period_s, ratios);
+        if sigma > allowed * (1.0 + FEED_TOLERANCE) {
+            // Where the period goes on to the next rest, a lower rate hardly lowers what is driven in it.
+            sigma = self.kept_by_halving(sigma, |follower, sigma| {
+                sigma <= follower.rate_below(sigma * follower.period_s, ratios)
+            });
+        }
         self.governor.jump(sigma.min(allowed));
     }
 
