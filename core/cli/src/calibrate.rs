@@ -93,7 +93,7 @@ fn program(path: &Path, machine: &Machine) -> Result<u8, Box<dyn Error>> {
     let (count, name) = (experiment.polygons.len(), path.display());
     print(&format!(
         "{name}: {count} polygons and lines there and back, an M0 before each; write what they take to a CSV file with the columns\n\
-         n,side_mm,repetitions,seconds,reading_error_s,axis\n(a line there and back has n 2, and its axis is X or Y; reading_error_s may be left out)\nand come back with --from, or with --log where the control logs times and lines\n"
+         n,side_mm,repetitions,seconds,reading_error_s,feed_mm_per_min,axis,exact_stop\n(a line there and back has n 2, and its axis is X or Y; reading_error_s may be left out, and a feed of 5000)\nand come back with --from, or with --log where the control logs times and lines\n"
     ));
     left_out(&experiment);
     Ok(0)

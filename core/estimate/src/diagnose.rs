@@ -369,7 +369,7 @@ pub fn linear(
     let a = coefficients.acceleration_mm_per_s2;
     let short = |t: &&Timed| {
         !t.polygon.is_stroke()
-            && block_time_s.is_none_or(|s| t.polygon.side_mm <= 0.999 * s * t.feed_mm_per_s)
+            && block_time_s.is_none_or(|s| t.polygon.side_mm <= 0.999 * s * t.polygon.feed_mm_per_s)
     };
     let (rows, feeds): (Vec<_>, Vec<_>) = timed
         .iter()

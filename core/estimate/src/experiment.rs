@@ -11,7 +11,8 @@ use tandem_sdk::AxisVector;
 use crate::diagnose::Corner;
 use crate::measurements::LogRow;
 use crate::polygon::{
-    CORNERS, FEED_MM_PER_MIN, PlaneAxis, Polygon, SIDES_MM, STROKE, STROKES_MM, Timed,
+    CORNERS, FEED_MM_PER_MIN, PlaneAxis, Polygon, SIDES_MM, SLOW_MM_PER_MIN, SLOW_STROKES_MM,
+    STROKE, STROKES_MM, Timed,
 };
 
 /// Turns of the V paths, degrees.
@@ -43,8 +44,6 @@ pub struct Experiment {
     pub polygons: Vec<Polygon>,
     /// Polygons that do not.
     pub left_out: Vec<Polygon>,
-    /// Feed of the polygons, mm/s: 5000 mm/min, or what the machine can.
-    pub feed_mm_per_s: f64,
     vees: Vec<Vee>,
     center_mm: [f64; 2],
     axes: [usize; 2],
@@ -84,25 +83,26 @@ impl Experiment {
         let half = |i: usize| (limits[i].max_mm - limits[i].min_mm) / 2.0;
         let finite = |value: f64| if value.is_finite() { value } else { 0.0 };
         let room_mm = half(0).min(half(1));
-        let feed = FEED_MM_PER_MIN / MM_PER_MIN;
+        let most = limits
+            .iter()
+            .fold(f64::INFINITY, |most, axis| most.min(axis.feed_mm_per_s));
         let all = CORNERS.iter().flat_map(|corners| {
             SIDES_MM.map(|side_mm| Polygon {
                 corners: *corners,
                 side_mm,
                 rounds: blocks.div_ceil(*corners),
                 along: PlaneAxis::X,
+                feed_mm_per_s: (FEED_MM_PER_MIN / MM_PER_MIN).min(most),
+                exact_stop: false,
             })
         });
         // Behind the others, so that a log of a program without them is one that ends early.
-        let all = all.chain(strokes(blocks));
+        let all = all.chain(strokes(blocks, most));
         let (polygons, left_out) =
             all.partition::<Vec<_>, _>(|polygon| polygon.radius_mm() <= room_mm);
         let this = Self {
             polygons,
             left_out,
-            feed_mm_per_s: limits
-                .iter()
-                .fold(feed, |feed, axis| feed.min(axis.feed_mm_per_s)),
             vees: vees().filter(|vee| vee.leg_mm <= room_mm).collect(),
             center_mm: [finite(middle(0)), finite(middle(1))],
             axes,
@@ -134,7 +134,6 @@ impl Experiment {
             let (from, to) = (starts(lines.first)?, starts(lines.last + 1)?);
             Some(Timed {
                 polygon: *polygon,
-                feed_mm_per_s: self.feed_mm_per_s,
                 time_s: to - from,
                 reading_error_s: 0.0,
             })
@@ -165,9 +164,16 @@ impl Experiment {
                     side_mm,
                     rounds,
                     along,
+                    feed_mm_per_s,
+                    exact_stop,
                 } = polygon;
                 let what = if polygon.is_stroke() {
-                    format!("there and back along {}", along.letter())
+                    let feed_mm_per_min = feed_mm_per_s * MM_PER_MIN;
+                    format!(
+                        "there and back along {}, F{feed_mm_per_min:.0}, exact stop {},",
+                        along.letter(),
+                        u8::from(*exact_stop)
+                    )
                 } else {
                     format!("n {corners}")
                 };
@@ -192,9 +198,10 @@ impl Experiment {
     fn polygon(&self, polygon: &Polygon, before: u32, text: &mut String) -> Lines {
         let points: Vec<_> = polygon.points_mm(self.center_mm).collect();
         let start = points[0];
-        let _ = writeln!(text, "G0 X{:.6} Y{:.6}", start[0], start[1]);
+        let mode = polygon.mode();
+        let _ = writeln!(text, "{mode} G0 X{:.6} Y{:.6}", start[0], start[1]);
         let _ = writeln!(text, "G4 P0.1");
-        let _ = writeln!(text, "F{:.3}", self.feed_mm_per_s * MM_PER_MIN);
+        let _ = writeln!(text, "F{:.3}", polygon.feed_mm_per_s * MM_PER_MIN);
         for point in points
             .iter()
             .cycle()
@@ -215,7 +222,7 @@ impl Experiment {
             x + vee.leg_mm * vee.turn_rad.cos(),
             y + vee.leg_mm * vee.turn_rad.sin(),
         ];
-        let _ = writeln!(text, "G0 X{:.6} Y{y:.6}", x - vee.leg_mm);
+        let _ = writeln!(text, "G64 G0 X{:.6} Y{y:.6}", x - vee.leg_mm);
         let _ = writeln!(text, "G4 P0.1");
         let _ = writeln!(
             text,
@@ -278,22 +285,24 @@ impl Experiment {
     }
 }
 
-/// Strokes along both axes. None is longer together than `blocks` of the longest sides of the polygons are.
-fn strokes(blocks: u32) -> impl Iterator<Item = Polygon> {
-    let longest_mm = SIDES_MM[SIDES_MM.len() - 1];
-    [PlaneAxis::X, PlaneAxis::Y]
-        .into_iter()
-        .flat_map(move |along| {
-            STROKES_MM.map(|side_mm| {
-                let share = (longest_mm / side_mm).min(1.0);
-                Polygon {
-                    corners: STROKE,
-                    side_mm,
-                    rounds: (f64::from(blocks) * share / f64::from(STROKE)).ceil() as u32,
-                    along,
-                }
-            })
+/// Strokes along both axes, at no more than `most` mm/s. At their feed none takes longer than `blocks` of the longest sides of the
+/// polygons.
+fn strokes(blocks: u32, most: f64) -> impl Iterator<Item = Polygon> {
+    let longest = SIDES_MM[SIDES_MM.len() - 1] / FEED_MM_PER_MIN;
+    let fast = STROKES_MM.map(|side_mm| (side_mm, FEED_MM_PER_MIN));
+    let slow = SLOW_STROKES_MM.map(|side_mm| (side_mm, SLOW_MM_PER_MIN));
+    let all = fast.into_iter().chain(slow);
+    all.flat_map(move |(side_mm, feed_mm_per_min)| {
+        let share = (longest * feed_mm_per_min / side_mm).min(1.0);
+        [PlaneAxis::X, PlaneAxis::Y].map(|along| Polygon {
+            corners: STROKE,
+            side_mm,
+            rounds: (f64::from(blocks) * share / f64::from(STROKE)).ceil() as u32,
+            along,
+            feed_mm_per_s: (feed_mm_per_min / MM_PER_MIN).min(most),
+            exact_stop: feed_mm_per_min < FEED_MM_PER_MIN,
         })
+    })
 }
 
 fn vees() -> impl Iterator<Item = Vee> {
@@ -357,12 +366,7 @@ impl Watch<'_> {
     }
 
     fn measured(self) -> Measured {
-        let Experiment {
-            polygons,
-            vees,
-            feed_mm_per_s,
-            ..
-        } = self.experiment;
+        let Experiment { polygons, vees, .. } = self.experiment;
         let times = self
             .samples
             .iter()
@@ -370,7 +374,6 @@ impl Watch<'_> {
         let timed = polygons.iter().zip(times);
         let timed = timed.map(|(polygon, time_s)| Timed {
             polygon: *polygon,
-            feed_mm_per_s: *feed_mm_per_s,
             time_s,
             reading_error_s: 0.0,
         });

@@ -1,5 +1,5 @@
 //! Times noted at a control, as CSV: `n,side_mm,repetitions,seconds`, `feed_mm_per_min` where it was not 5000, `reading_error_s`
-//! where it is known how far a reading may be off, and `axis` of lines there and back.
+//! where it is known how far a reading may be off, `axis` of lines there and back, and `exact_stop`, 1 where each side ends in one.
 
 use std::io::Read as _;
 use std::path::Path;
@@ -20,6 +20,7 @@ struct Row {
     feed_mm_per_min: Option<f64>,
     reading_error_s: Option<f64>,
     axis: Option<String>,
+    exact_stop: Option<u8>,
 }
 
 /// Reads the measurements in the file at `path`. Lines that begin with # are left out.
@@ -296,10 +297,15 @@ impl Row {
             side_mm: self.side_mm,
             rounds: self.repetitions,
             along: self.along()?,
+            feed_mm_per_s: feed_mm_per_min / 60.0,
+            exact_stop: match self.exact_stop {
+                None | Some(0) => false,
+                Some(1) => true,
+                Some(other) => return Err(format!("exact_stop: {other} is neither 0 nor 1")),
+            },
         };
         Ok(Timed {
             polygon,
-            feed_mm_per_s: feed_mm_per_min / 60.0,
             time_s: self.seconds,
             reading_error_s,
         })

@@ -177,7 +177,7 @@ impl<'a> Bench<'a> {
                 rounds: driven,
                 ..timed.polygon
             };
-            write(&mut text, &shorter, timed.feed_mm_per_s);
+            write(&mut text, &shorter);
             let from = if driven == middle + around {
                 BEFORE_BLOCKS
             } else {
@@ -247,14 +247,15 @@ impl<'a> Bench<'a> {
 }
 
 /// A polygon, from a rest to a rest.
-fn write(text: &mut String, polygon: &Polygon, feed_mm_per_s: f64) {
+fn write(text: &mut String, polygon: &Polygon) {
     use std::fmt::Write as _;
     let points: Vec<_> = polygon.points_mm([0.0; 2]).collect();
     let [x, y] = points[0];
     let _ = writeln!(
         text,
-        "G0 X{x:.6} Y{y:.6}\nG4 P0.1\nF{:.6}",
-        feed_mm_per_s * 60.0
+        "{} G0 X{x:.6} Y{y:.6}\nG4 P0.1\nF{:.6}",
+        polygon.mode(),
+        polygon.feed_mm_per_s * 60.0
     );
     let count = polygon.blocks() as usize;
     for [x, y] in points.iter().cycle().skip(1).take(count) {
@@ -383,7 +384,7 @@ pub fn fit(
     timed: &[Timed],
     kind: PlannerKind,
 ) -> Result<(Planned, Vec<f64>), String> {
-    let tells = |timed: &&Timed| timed.mean_feed_mm_per_s() < AT_FEED * timed.feed_mm_per_s;
+    let tells = |timed: &&Timed| timed.mean_feed_mm_per_s() < AT_FEED * timed.polygon.feed_mm_per_s;
     let mut telling: Vec<Timed> = timed.iter().filter(tells).copied().collect();
     if telling.len() < 6 {
         telling = timed.to_vec();

@@ -13,9 +13,14 @@ pub const SIDES_MM: [f64; 5] = [0.1, 0.42, 1.0, 2.0, 4.0];
 /// and their short sides say little of acceleration where jerk is bounded. A stroke moves one axis, from rest to rest; the longest
 /// reaches its feed.
 pub const STROKES_MM: [f64; 6] = [1.0, 2.0, 4.0, 8.0, 16.0, 32.0];
+/// Sides of those at a lower feed with exact stops, and that feed, mm/min: there a time constant shows, which at a high feed hides
+/// behind the acceleration, and where blocks overlap behind the tolerance.
+pub const SLOW_STROKES_MM: [f64; 2] = [2.0, 8.0];
+/// See there.
+pub const SLOW_MM_PER_MIN: f64 = 1000.0;
 /// Corners of a stroke.
 pub const STROKE: u32 = 2;
-/// Their feed, mm/min.
+/// Feed of the polygons, mm/min.
 pub const FEED_MM_PER_MIN: f64 = 5000.0;
 
 /// Blocks after which nothing changes any more from round to round.
@@ -49,7 +54,7 @@ impl PlaneAxis {
     }
 }
 
-/// A regular polygon, gone round some times without a stop. One of two corners is a stroke: a line there and back.
+/// A regular polygon, gone round some times. One of two corners is a stroke: a line there and back.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Polygon {
     /// Corners.
@@ -60,6 +65,10 @@ pub struct Polygon {
     pub rounds: u32,
     /// The axis along which its first side points.
     pub along: PlaneAxis,
+    /// Programmed feed, mm/s.
+    pub feed_mm_per_s: f64,
+    /// Whether every side ends in an exact stop (G61).
+    pub exact_stop: bool,
 }
 
 /// A polygon and the time it took.
@@ -67,8 +76,6 @@ pub struct Polygon {
 pub struct Timed {
     /// The polygon.
     pub polygon: Polygon,
-    /// Programmed feed, mm/s.
-    pub feed_mm_per_s: f64,
     /// Time, s.
     pub time_s: f64,
     /// How far the reading may be off, s; 0 where nothing is known of that.
@@ -87,6 +94,11 @@ impl Polygon {
     /// Whether it is a line there and back, which moves one axis alone.
     pub fn is_stroke(&self) -> bool {
         self.corners == STROKE
+    }
+
+    /// What the program states before it.
+    pub(crate) fn mode(&self) -> &'static str {
+        if self.exact_stop { "G61" } else { "G64" }
     }
 
     /// Number of blocks.
@@ -113,10 +125,10 @@ impl Polygon {
     }
 
     /// Its blocks.
-    pub fn elements(&self, feed_mm_per_s: f64) -> impl Iterator<Item = Element> {
+    pub fn elements(&self) -> impl Iterator<Item = Element> {
         let (turn, side_mm, first) = (self.turn_rad(), self.side_mm, self.along.angle_rad());
         let round: Vec<_> = (0..self.corners)
-            .map(|k| Element::line(side_mm, first + f64::from(k) * turn, feed_mm_per_s))
+            .map(|k| Element::line(side_mm, first + f64::from(k) * turn, self.feed_mm_per_s))
             .collect();
         let count = self.blocks() as usize;
         round.into_iter().cycle().take(count)
@@ -173,9 +185,12 @@ impl Timed {
             };
             number += 1;
         };
-        shorter
-            .elements(self.feed_mm_per_s)
-            .for_each(|element| model.block(&element, &mut add));
+        for element in shorter.elements() {
+            model.block(&element, &mut add);
+            if shorter.exact_stop {
+                model.finish(&mut add);
+            }
+        }
         model.finish(&mut add);
         total_s + f64::from(self.polygon.rounds - rounds) * round_s
     }

@@ -45,10 +45,11 @@ fn the_published_table_is_that_of_an_overlap_control() {
                 side_mm: 2.0 * half,
                 rounds: rounds as u32,
                 along: PlaneAxis::X,
+                feed_mm_per_s: 5000.0 / 60.0,
+                exact_stop: false,
             };
             Timed {
                 polygon,
-                feed_mm_per_s: 5000.0 / 60.0,
                 time_s,
                 reading_error_s: 0.0,
             }
@@ -148,8 +149,9 @@ fn a_control_whose_axes_are_unequal_is_found_from_noisy_readings() {
                     side_mm,
                     rounds: 2000 / corners,
                     along: PlaneAxis::X,
+                    feed_mm_per_s: 5000.0 / 60.0,
+                    exact_stop: false,
                 },
-                feed_mm_per_s: 5000.0 / 60.0,
                 time_s: 1.0,
                 reading_error_s: 0.0,
             };
