@@ -13,7 +13,7 @@ pub const SIDES_MM: [f64; 5] = [0.1, 0.42, 1.0, 2.0, 4.0];
 /// and their short sides say little of acceleration where jerk is bounded. A stroke moves one axis, from rest to rest; the longest
 /// reaches its feed.
 pub const STROKES_MM: [f64; 6] = [1.0, 2.0, 4.0, 8.0, 16.0, 32.0];
-/// Sides of those at a lower feed with exact stops, and that feed, mm/min: there a time constant shows, which at a high feed hides
+/// Sides of those at a lower feed under G61, from rest to rest, and that feed, mm/min: there a time constant shows, which at a high feed hides
 /// behind the acceleration, and where blocks overlap behind the tolerance.
 pub const SLOW_STROKES_MM: [f64; 2] = [2.0, 8.0];
 /// See there.
@@ -67,7 +67,7 @@ pub struct Polygon {
     pub along: PlaneAxis,
     /// Programmed feed, mm/s.
     pub feed_mm_per_s: f64,
-    /// Whether every side ends in an exact stop (G61).
+    /// Whether it is driven under G61, so that strokes stop at both ends whatever the control does elsewhere.
     pub exact_stop: bool,
 }
 
