@@ -225,6 +225,10 @@ pub struct Limit<'a> {
     at: usize,
 }
 
+/// A limit that rises by this much from one place to the next steps there: a block of a higher feed begins. Along a curve places stand so
+/// close that it rises by less, and a ramp that is compared at each of them is another one at nearly every curve.
+const STEP: f64 = 1.1;
+
 impl<'a> Limit<'a> {
     /// Of two places at least.
     pub fn new(places: &'a [Corner]) -> Self {
@@ -249,18 +253,15 @@ impl<'a> Limit<'a> {
         a.speed_mm_per_s + share * (b.speed_mm_per_s - a.speed_mm_per_s)
     }
 
-    /// The places behind one path coordinate, at which the limit was asked for last, and before another.
-    pub fn between(&self, from_mm: f64, to_mm: f64) -> &'a [Corner] {
-        let behind = &self.places[self.at..];
-        let first = behind
-            .iter()
-            .take_while(|place| place.at_mm <= from_mm)
-            .count();
-        let inside = &behind[first..];
-        &inside[..inside
-            .iter()
-            .take_while(|place| place.at_mm < to_mm)
-            .count()]
+    /// The places behind one path coordinate, at which the limit was asked for last, and before another, right behind which the limit
+    /// rises at once: where a block of a higher feed begins.
+    pub fn between(&self, from_mm: f64, to_mm: f64) -> impl Iterator<Item = &'a Corner> {
+        let pairs = self.places[self.at..].windows(2);
+        pairs
+            .skip_while(move |pair| pair[0].at_mm <= from_mm)
+            .take_while(move |pair| pair[0].at_mm < to_mm)
+            .filter(|pair| pair[1].speed_mm_per_s > STEP * pair[0].speed_mm_per_s)
+            .map(|pair| &pair[0])
     }
 }
 

@@ -113,7 +113,7 @@ fn merge(corners: &mut Vec<Corner>) {
 }
 
 /// The place of a ramp that is furthest above the limit, as a corner at the limit. Between two looks the limit may be lower than at
-/// both: where a block of another feed begins.
+/// both: where a block of a higher feed begins.
 fn worst(ramp: &Ramp, limit: &mut Limit, care: &Care) -> Option<Corner> {
     if ramp.duration_s == 0.0 {
         return None;
