@@ -93,8 +93,9 @@ fn stop_at(
     }))
 }
 
+/// The place of that share of sorted stops. The last of a few is not it: one of them may be the one of a hundred.
 fn share(stops: &[Stop], of: f64) -> usize {
-    ((stops.len() as f64 * of) as usize).min(stops.len() - 1)
+    ((stops.len() as f64 * of) as usize).min(stops.len().saturating_sub(2))
 }
 
 /// Of `share_of` the stops none may take more than `MOST` times the shortest; docs/stopping.md says what the others are.

@@ -88,8 +88,11 @@ fn found(output: &Output) -> String {
     lines.collect::<Vec<_>>().join("\n")
 }
 
+/// The results in a folder. A process that is killed while it writes leaves a file that is not one yet.
 fn results(folder: &Path) -> BTreeMap<String, Vec<u8>> {
-    tandem_rig::files(&folder.join("results"))
+    let mut files = tandem_rig::files(&folder.join("results"));
+    files.retain(|name, _| !name.starts_with(".tmp"));
+    files
 }
 
 /// Rows of a table of results by the names of its columns.
