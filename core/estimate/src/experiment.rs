@@ -140,11 +140,9 @@ impl Experiment {
         });
         let timed: Vec<_> = timed.flatten().filter(|timed| timed.time_s > 0.0).collect();
         // A control may have driven a program that was written before there were strokes.
-        let round = |polygons: &mut dyn Iterator<Item = &Polygon>| {
-            polygons.filter(|polygon| !polygon.is_stroke()).count()
-        };
-        let found = round(&mut timed.iter().map(|timed| &timed.polygon));
-        let wanted = round(&mut self.polygons.iter());
+        let found = timed.iter().filter(|timed| !timed.polygon.is_stroke());
+        let wanted = self.polygons.iter().filter(|p| !p.is_stroke());
+        let (found, wanted) = (found.count(), wanted.count());
         if found == wanted {
             return Ok(timed);
         }
@@ -196,20 +194,7 @@ impl Experiment {
     }
 
     fn polygon(&self, polygon: &Polygon, before: u32, text: &mut String) -> Lines {
-        let points: Vec<_> = polygon.points_mm(self.center_mm).collect();
-        let start = points[0];
-        let mode = polygon.mode();
-        let _ = writeln!(text, "{mode} G0 X{:.6} Y{:.6}", start[0], start[1]);
-        let _ = writeln!(text, "G4 P0.1");
-        let _ = writeln!(text, "F{:.3}", polygon.feed_mm_per_s * MM_PER_MIN);
-        for point in points
-            .iter()
-            .cycle()
-            .skip(1)
-            .take(polygon.blocks() as usize)
-        {
-            let _ = writeln!(text, "G1 X{:.6} Y{:.6}", point[0], point[1]);
-        }
+        polygon.write(self.center_mm, text);
         Lines {
             first: before + 4,
             last: before + 3 + polygon.blocks(),

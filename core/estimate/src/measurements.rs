@@ -1,5 +1,5 @@
 //! Times noted at a control, as CSV: `n,side_mm,repetitions,seconds`, `feed_mm_per_min` where it was not 5000, `reading_error_s`
-//! where it is known how far a reading may be off, `axis` of lines there and back, and `exact_stop`, 1 where each side ends in one.
+//! where it is known how far a reading may be off, `axis` of lines there and back, and `exact_stop`, 1 where it was driven under G61.
 
 use std::io::Read as _;
 use std::path::Path;
@@ -248,7 +248,7 @@ fn cause(error: &csv::Error, headers: &csv::StringRecord) -> String {
 impl Row {
     /// The axis of a stroke, which has to be stated; other polygons begin along X.
     fn along(&self) -> Result<PlaneAxis, String> {
-        let axis = self.axis.as_deref().map(str::trim).unwrap_or_default();
+        let axis = self.axis.as_deref().unwrap_or_default();
         match (self.n, axis) {
             (STROKE, "X" | "x") => Ok(PlaneAxis::X),
             (STROKE, "Y" | "y") => Ok(PlaneAxis::Y),

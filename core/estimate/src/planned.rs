@@ -177,7 +177,7 @@ impl<'a> Bench<'a> {
                 rounds: driven,
                 ..timed.polygon
             };
-            write(&mut text, &shorter);
+            shorter.write([0.0; 2], &mut text);
             let from = if driven == middle + around {
                 BEFORE_BLOCKS
             } else {
@@ -243,23 +243,6 @@ impl<'a> Bench<'a> {
             sum(&part.all) + f64::from(rounds - driven) * round_s
         };
         Ok(self.parts.iter().map(time).collect())
-    }
-}
-
-/// A polygon, from a rest to a rest.
-fn write(text: &mut String, polygon: &Polygon) {
-    use std::fmt::Write as _;
-    let points: Vec<_> = polygon.points_mm([0.0; 2]).collect();
-    let [x, y] = points[0];
-    let _ = writeln!(
-        text,
-        "{} G0 X{x:.6} Y{y:.6}\nG4 P0.1\nF{:.6}",
-        polygon.mode(),
-        polygon.feed_mm_per_s * 60.0
-    );
-    let count = polygon.blocks() as usize;
-    for [x, y] in points.iter().cycle().skip(1).take(count) {
-        let _ = writeln!(text, "G1 X{x:.6} Y{y:.6}");
     }
 }
 
@@ -426,7 +409,7 @@ pub fn fit(
         };
         Some(fine.near(each, &alone.near(each, &alike).0))
     } else {
-        without_strokes(&rough, &fine, &alike)
+        without_strokes(&rough, &fine, each, &alike)
     };
     let worth = |of_axes: &(Planned, f64)| of_axes.1 < WORTH_OF_AXES.powi(2) * fine.square(&alike);
     let found = of_axes
@@ -438,14 +421,9 @@ pub fn fit(
 
 /// The best constants for each axis that polygons alone tell, and the squares that they leave. They lie askew, and so they tell which
 /// axis is the weaker one; it may be so in one limit and not in the other.
-fn without_strokes(rough: &Fit, fine: &Fit, alike: &Planned) -> Option<(Planned, f64)> {
-    let kind = alike.kind;
-    let each = Form {
-        kind,
-        by_axes: true,
-    };
+fn without_strokes(rough: &Fit, fine: &Fit, each: Form, alike: &Planned) -> Option<(Planned, f64)> {
     let factors = ASKEW.iter().flat_map(|a| ASKEW.map(|j| [*a, j]));
-    let counts = |[a, j]: &[f64; 2]| match kind {
+    let counts = |[a, j]: &[f64; 2]| match each.kind {
         PlannerKind::Smooth => [*a, *j] != [1.0; 2],
         PlannerKind::BlockOverlap => *a != 1.0 && *j == 1.0,
     };

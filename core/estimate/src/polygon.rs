@@ -1,6 +1,7 @@
 //! The polygons of the calibration: what they are made of, and what a model says they take.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
+use std::fmt::Write as _;
 
 use crate::element::Element;
 use crate::model::{Model, Spent};
@@ -96,9 +97,20 @@ impl Polygon {
         self.corners == STROKE
     }
 
-    /// What the program states before it.
-    pub(crate) fn mode(&self) -> &'static str {
-        if self.exact_stop { "G61" } else { "G64" }
+    /// Writes it around a centre as part of a program, from a rest to a rest: three lines, and one for each of its blocks.
+    pub(crate) fn write(&self, center_mm: [f64; 2], text: &mut String) {
+        let points: Vec<_> = self.points_mm(center_mm).collect();
+        let [x, y] = points[0];
+        let mode = if self.exact_stop { "G61" } else { "G64" };
+        let feed_mm_per_min = self.feed_mm_per_s * 60.0;
+        let _ = writeln!(
+            text,
+            "{mode} G0 X{x:.6} Y{y:.6}\nG4 P0.1\nF{feed_mm_per_min:.3}"
+        );
+        let sides = points.iter().cycle().skip(1);
+        for [x, y] in sides.take(self.blocks() as usize) {
+            let _ = writeln!(text, "G1 X{x:.6} Y{y:.6}");
+        }
     }
 
     /// Number of blocks.

@@ -141,7 +141,7 @@ mod tests {
     use super::*;
     use crate::plan_ahead::{Ahead, Axes, PlanAhead};
     use crate::steps::Recent;
-    use tandem_sdk::{AxisLimits, AxisVector, MAX_AXES, Segment, SegmentFlags};
+    use tandem_sdk::{AxisVector, Segment, SegmentFlags};
 
     const PERIOD_S: f64 = 0.001;
 
@@ -184,15 +184,7 @@ mod tests {
     #[test]
     fn the_mean_of_a_period_counts_from_below_the_feed() {
         const FEED: f64 = 10.0;
-        let limits = [AxisLimits {
-            min_mm: -1000.0,
-            max_mm: 1000.0,
-            feed_mm_per_s: 1000.0,
-            rapid_mm_per_s: 1000.0,
-            acceleration_mm_per_s2: 50_000.0,
-            jerk_mm_per_s3: 1e6,
-            speed_difference_mm_per_s: 0.0,
-        }; MAX_AXES];
+        let limits = order3::tests::limits(50_000.0, 1e6);
         let governor = Governor::new(&limits, 2, PERIOD_S);
         // Speed and mean speed of the period that is chosen where the plan goes up and down by so much within a period.
         let chosen = |speed: f64, hump: f64| {
@@ -231,15 +223,7 @@ mod tests {
     #[test]
     fn the_speed_bends_to_the_feed_once_and_stays_at_it() {
         const JERK: f64 = 1000.0;
-        let limits = [AxisLimits {
-            min_mm: -1000.0,
-            max_mm: 1000.0,
-            feed_mm_per_s: 1000.0,
-            rapid_mm_per_s: 1000.0,
-            acceleration_mm_per_s2: 500.0,
-            jerk_mm_per_s3: JERK,
-            speed_difference_mm_per_s: 0.0,
-        }; MAX_AXES];
+        let limits = order3::tests::limits(500.0, JERK);
         let governor = Governor::new(&limits, 2, PERIOD_S);
         for (rise, feed) in [(10.0, 12.0), (40.0, 20.0), (80.0, 30.0)] {
             let mut segment = Segment::rest(&AxisVector::ZERO, 2.0);

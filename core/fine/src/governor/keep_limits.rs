@@ -304,6 +304,7 @@ pub(super) fn nearest_with_way(
 
 #[cfg(test)]
 mod tests {
+    use super::super::order3;
     use super::*;
     use crate::plan_ahead::{PlanAhead, TWO_LINEAR};
     use proptest::prelude::*;
@@ -315,15 +316,7 @@ mod tests {
     const JERK: f64 = 20_000.0;
 
     fn limits() -> [AxisLimits; MAX_AXES] {
-        [AxisLimits {
-            min_mm: -1000.0,
-            max_mm: 1000.0,
-            feed_mm_per_s: 1000.0,
-            rapid_mm_per_s: 1000.0,
-            acceleration_mm_per_s2: ACCELERATION,
-            jerk_mm_per_s3: JERK,
-            speed_difference_mm_per_s: 0.0,
-        }; MAX_AXES]
+        order3::tests::limits(ACCELERATION, JERK)
     }
 
     /// A segment that goes on from `before` with this jerk per axis.
