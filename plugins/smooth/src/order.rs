@@ -22,8 +22,8 @@ pub struct Order {
 
 impl Order {
     /// Finds the places of `samples` in a motion to `end` that follows the path: each within tolerance of the path, none before
-    /// that of the sample before; false where there are none. Samples before `begin` are those of another window, which has looked at
-    /// them; where it is left the path is near chord `near`.
+    /// that of the sample before, from the start to the end; false where there are none. Samples before `begin` are those of another
+    /// window, which has looked at them; where it is left the path is near chord `near`.
     #[inline(always)]
     pub fn walk<const L: usize>(
         &mut self,
@@ -43,10 +43,14 @@ impl Order {
             }
             self.first.push(walker.s());
         }
+        // Where the path goes round twice, a motion that goes round once has places on the way there as well as on the way back.
+        let mut is_whole =
+            walker.is_near_all(run.chord_at(end, walker.chord), &samples[samples.len() - 1]);
         let mut walker = Walker::begin(run, end);
         for n in (0..samples.len()).rev() {
             if walker.goes_back(&samples[(n + 1).min(samples.len() - 1)], &samples[n]) {
                 self.last.push(walker.s());
+                is_whole |= n == begin && walker.is_near_all(near, &samples[n]);
             } else if n >= begin {
                 return false;
             } else {
@@ -56,7 +60,7 @@ impl Order {
             }
         }
         self.last.reverse();
-        true
+        is_whole
     }
 
     /// Between which samples a vertex at `s` may be passed: where the path comes by again, those before the window are none that pass it
@@ -132,6 +136,13 @@ impl<'a, const L: usize> Walker<'a, L> {
             self.chord -= 1;
             self.along = self.chords[self.chord].length;
         }
+    }
+
+    /// Whether all vertices from here to chord `other` are near `sample`.
+    fn is_near_all(&self, other: usize, sample: &Lanes<L>) -> bool {
+        let first = self.chord.min(other) + 1;
+        let last = self.chord.max(other);
+        (first..=last).all(|vertex| self.is_near(vertex, sample, sample))
     }
 
     /// Whether the vertex at the start of chord `vertex` is near the way from one sample to another.
@@ -239,6 +250,17 @@ pub(crate) mod tests {
             &path,
             &[[0.0, 0.0], [0.5, 0.0], [1.0, 0.0], [1.0, -0.5], [1.0, -1.0]]
         ));
+    }
+
+    /// On the way there the first round is driven, on the way back the last.
+    #[test]
+    fn a_motion_that_goes_round_once_where_the_path_does_twice_has_none() {
+        let round = [[1.0, 0.0], [1.0, 0.3], [0.7, 0.3], [1.0, 0.0]];
+        let twice = [&[[0.0, 0.0]][..], &round, &round[1..]].concat();
+        let once = [&[[0.0, 0.0]][..], &round].concat();
+        assert!(in_order(&twice, &twice));
+        assert!(!in_order(&twice, &once));
+        assert!(in_order(&once, &once));
     }
 
     /// Where the path turns back and comes by again, the samples before a window are not those that pass the vertices in it.
