@@ -41,6 +41,8 @@ pub(super) struct Below<'a> {
     most: [f64; PLACES],
     seen: usize,
     place: PlanCursor<'a>,
+    /// The speed at the last one seen, as a share of the one asked for.
+    begun: Option<f64>,
     /// Program time from the last one seen to the next, s.
     step_s: f64,
     /// Steps on ways that may still be tried in this period.
@@ -58,6 +60,7 @@ impl<'a> Below<'a> {
             most: [0.0; PLACES],
             seen: 0,
             place,
+            begun: None,
             step_s: period_s * here.sigma.max(FEED_POINT_MIN_RATE),
             steps_left: 0,
         }
@@ -73,32 +76,36 @@ impl<'a> Below<'a> {
         self.most[..self.seen].get(number).copied()
     }
 
-    /// Moves on to the next place, and gives the highest rate at the middle and the ends of what it passes of each segment: places
-    /// far ahead lie so far apart that an axis may get too fast, and slow again, between two of them.
+    /// Moves on to the next place, and gives the highest rate on the way there, by the middle and the ends of what it passes of each
+    /// segment: places far ahead lie so far apart that an axis may get too fast, and slow again, between two of them.
     fn most_on_the_way(&mut self) -> Option<f64> {
-        let (mut left_s, mut most) = (self.step_s, f64::INFINITY);
+        let (mut left_s, mut highest) = (self.step_s, 0.0_f64);
         loop {
             let stretch_s = self.place.stretch_s(left_s);
-            for half_s in [stretch_s / 2.0; 2] {
-                self.place.advance(half_s);
-                most = most.min(self.rate_here()?);
-            }
+            let begun = self.begun;
+            self.place.advance(stretch_s / 2.0);
+            let middle = self.share_here()?;
+            self.place.advance(stretch_s / 2.0);
+            let end = self.share_here()?;
+            self.begun = Some(end);
+            highest = highest.max(highest_of([begun.unwrap_or(middle), middle, end]));
             left_s -= stretch_s;
             if left_s <= 0.0 {
-                return Some(most);
+                return Some(1.0 / highest);
             }
             self.place.step();
-            let Some(begun) = self.rate_here() else {
-                return most.is_finite().then_some(most);
+            self.begun = self.share_here();
+            let Some(begun) = self.begun else {
+                return (highest > 0.0).then_some(1.0 / highest);
             };
-            most = most.min(begun);
+            highest = highest.max(begun);
         }
     }
 
-    /// The highest rate at the place; `None` where nothing moves.
-    fn rate_here(&self) -> Option<f64> {
+    /// The speed of the plan at the place as a share of the one asked for; `None` where nothing moves.
+    fn share_here(&self) -> Option<f64> {
         let pace = self.place.pace()?;
-        Some(self.ratio * self.place.feed_mm_per_s() / pace.speed)
+        Some(pace.speed / (self.ratio * self.place.feed_mm_per_s()))
     }
 
     /// Whether at the rate `sigma` no place ahead is too fast, which is mostly said by the first that is.
@@ -107,6 +114,17 @@ impl<'a> Below<'a> {
             || (0..)
                 .map_while(|number| self.rate_at(number))
                 .all(|most| sigma < most)
+    }
+}
+
+/// The highest of the parabola through the values at the beginning, in the middle and at the end of a stretch.
+fn highest_of([begin, middle, end]: [f64; 3]) -> f64 {
+    let bend = 2.0 * middle - begin - end;
+    let slope = end - begin;
+    if slope.abs() < 2.0 * bend {
+        middle + slope * slope / (8.0 * bend)
+    } else {
+        begin.max(middle).max(end)
     }
 }
 
@@ -168,8 +186,13 @@ impl Below<'_> {
         let range = ways.range(&here, h, horizon)?;
         let kept = ways.found.peek().filter(|_| ways.found.keeps_feed);
         let good = kept.unwrap_or(range.nearest(-MAX_LOWERING / (h * h)));
-        nearest_with_way(range.nearest(wanted), good, HALVINGS, |change| {
+        let found = nearest_with_way(range.nearest(wanted), good, HALVINGS, |change| {
             self.leaves_way(change, here, ways, horizon)
+        });
+        // A way that has come to its end goes on at the rate that it has come to, which keeps what it was sought for.
+        found.or_else(|| {
+            let stays = here.rate_per_s == 0.0 && range.contains(0.0);
+            (stays && self.leaves_way(0.0, here, ways, horizon)).then_some(0.0)
         })
     }
 
@@ -394,6 +417,46 @@ mod tests {
             path: [0.1, -1.0, 0.0],
         };
         assert!(Below::new(&aim, &here, 1e-3).is_kept_at(1.0));
+    }
+
+    /// The plan gets too fast for some periods, far ahead, where places lie apart.
+    #[test]
+    fn a_short_peak_between_two_places_ahead_counts_as_high_as_it_is() {
+        const PEAK: f64 = 10.0;
+        for meets_s in (10..60).map(|n| 1e-3 * f64::from(n)) {
+            let mut segment = Segment::rest(&AxisVector::ZERO, 0.1);
+            // Speed is PEAK − 2000 (t − meets)² and a term of third order.
+            let [square, cube] = [-2000.0, 4000.0];
+            let at = |t: f64| {
+                let off = t - meets_s;
+                [
+                    PEAK + off * off * (square + cube * off),
+                    off * (2.0 * square + 3.0 * cube * off),
+                    square + 3.0 * cube * off,
+                    cube,
+                ]
+            };
+            let [speed, rise, second, third] = at(0.0);
+            segment.coefficients[0] = [0.0, speed, rise / 2.0, second / 3.0, third / 4.0, 0.0];
+            segment.path = segment.coefficients[0];
+            segment.feed_mm_per_s = 1.0;
+            let ahead = Ahead::new(&segment, Some(0.0), 0, None);
+            let here = RateState {
+                sigma: 0.5,
+                rate_per_s: 0.0,
+                place: ahead.place(TWO_LINEAR),
+                recent: Recent::default(),
+            };
+            let aim = Aim {
+                goal: Goal::run(1.0, 5.0, None),
+                ratio: 5.0,
+                kept_rate: 0.3,
+                path: [speed, rise, 0.0],
+            };
+            let mut below = Below::new(&aim, &here, 1e-3);
+            assert!(below.is_kept_at(0.5 * (1.0 - 2e-5)), "{meets_s}");
+            assert!(!below.is_kept_at(0.5 * (1.0 + 2e-5)), "{meets_s}");
+        }
     }
 
     /// At twice the feed on a line: lowering the rate to where the feed is kept takes little more than the shortest time.
