@@ -122,3 +122,20 @@ fn a_sample_beyond_a_limit_is_told_with_its_size() {
         "{told}"
     );
 }
+
+#[test]
+fn a_jerk_that_is_only_reported_is_told_with_its_size() {
+    let done = run("G21 G90 G94\nF6000\nG1 X20\nM2\n", &planners()[0], "");
+    assert_eq!(done.summary()["jerk"], "report");
+    assert!(done.number("limit_violations") == 0.0);
+    let highest = done.summary()["max_jerk_mm_s3"]["x"].as_f64().unwrap();
+    let told = String::from_utf8_lossy(&done.output.stdout).into_owned();
+    let size = format!(": X {:.2} times its limit at tick ", highest / 20_000.0);
+    let line = told
+        .lines()
+        .find_map(|line| line.strip_prefix("largest jerk, which is only reported"));
+    assert!(
+        highest > 20_001.0 && line.is_some_and(|line| line.starts_with(&size)),
+        "{highest}: {told}"
+    );
+}

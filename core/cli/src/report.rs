@@ -220,12 +220,18 @@ fn facts(summary: &Summary) -> Vec<(String, String)> {
             "samples beyond a limit sent, guard stops",
             format!("{}, {}", summary.limit_violations, summary.guard_stops),
         ),
-        fact("largest share of a limit, beyond it", worst(summary)),
+        fact(
+            "largest share of a limit, beyond it",
+            worst_of_judged(summary).unwrap_or_else(|| "none".to_string()),
+        ),
         fact(
             "governed samples, starvations",
             format!("{}, {}", summary.governed_samples, summary.starvations),
         ),
     ];
+    facts.extend(
+        worst_of_reported(summary).map(|worst| fact("largest jerk, which is only reported", worst)),
+    );
     facts.extend(
         summary
             .max_phase_us
@@ -269,24 +275,28 @@ fn facts(summary: &Summary) -> Vec<(String, String)> {
     facts
 }
 
-/// The worst sample beyond a limit, whatever its excuse.
-fn worst(summary: &Summary) -> String {
-    summary
-        .worst_beyond()
-        .map_or("none".to_string(), |(what, of, within)| {
-            let within = if of.share <= within {
-                "within"
-            } else {
-                "beyond"
-            };
-            format!(
-                "{what} {:.2} % at tick {}, line {}, {}, {within} the tolerance",
-                of.share * 100.0,
-                of.tick,
-                of.line,
-                of.state
-            )
-        })
+/// The worst sample beyond a limit that is judged, with its size, whatever tolerance it is within.
+pub(crate) fn worst_of_judged(summary: &Summary) -> Option<String> {
+    let (what, of, within) = summary.worst_beyond()?;
+    let within = if of.share <= within {
+        "within"
+    } else {
+        "beyond"
+    };
+    let percent = of.share * 100.0;
+    Some(format!(
+        "{what} {percent:.2} % at tick {}, line {}, {}, {within} the tolerance",
+        of.tick, of.line, of.state
+    ))
+}
+
+/// The worst jerk beyond its limit where jerk is reported and not judged.
+pub(crate) fn worst_of_reported(summary: &Summary) -> Option<String> {
+    let (axis, of) = summary.worst_reported_jerk()?;
+    Some(format!(
+        "{axis} {:.2} times its limit at tick {}, line {}, {}",
+        of.share, of.tick, of.line, of.state
+    ))
 }
 
 /// The histogram of planning times, by doublings; short ones together.

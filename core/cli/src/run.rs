@@ -24,7 +24,7 @@ use crate::broken::Broken;
 use crate::home::Corrections;
 use crate::operator::{Keyboard, Operator, Presence, tell};
 use crate::progress::Progress;
-use crate::report::Collector;
+use crate::report::{Collector, worst_of_judged, worst_of_reported};
 use crate::trace::TraceSink;
 use crate::warnings::tell_warnings;
 use crate::{FAULT, REFUSED, args, built_in, clock, hang, operator, piped, program, refusal};
@@ -567,20 +567,11 @@ fn print_outcome(out: &mut impl Write, options: &args::Run, summary: &Summary) -
     if let Some(timing) = summary.timing() {
         writeln!(out, "{timing}")?;
     }
-    if let Some((what, of, within)) = summary.worst_beyond() {
-        let within = if of.share <= within {
-            "within"
-        } else {
-            "beyond"
-        };
-        writeln!(
-            out,
-            "largest share of a limit: {what} {:.2} % at tick {}, line {}, {}, {within} the tolerance",
-            of.share * 100.0,
-            of.tick,
-            of.line,
-            of.state
-        )?;
+    if let Some(worst) = worst_of_judged(summary) {
+        writeln!(out, "largest share of a limit: {worst}")?;
+    }
+    if let Some(worst) = worst_of_reported(summary) {
+        writeln!(out, "largest jerk, which is only reported: {worst}")?;
     }
     if let Some(stop) = longest(&summary.stops) {
         print_stop(out, summary, stop)?;

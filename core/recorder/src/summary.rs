@@ -278,11 +278,25 @@ pub struct OfLimits {
     pub jerk: OfLimit,
 }
 
+/// A share of a limit that is larger than 1 by less than that is rounding.
+const TOLERANCE: f64 = 1e-6;
+
 impl Summary {
+    /// The worst jerk beyond its limit where jerk is reported and not judged: the axis and the sample. `None` where none is
+    /// beyond, and where it is judged: there it is one of [`Self::worst_beyond`].
+    pub fn worst_reported_jerk(&self) -> Option<(String, OfLimit)> {
+        if self.jerk == "limit" {
+            return None;
+        }
+        let each = self.worst_of_limits.iter();
+        each.map(|(axis, of)| (axis.to_uppercase(), of.jerk))
+            .filter(|(_, of)| of.share > 1.0 + TOLERANCE)
+            .max_by(|(_, a), (_, b)| a.share.total_cmp(&b.share))
+    }
+
     /// The worst sample beyond a limit that counts on this machine: what is exceeded, such as `X jerk`, the sample, and the
     /// share up to which it is within the tolerance. `None` where no sample is beyond.
     pub fn worst_beyond(&self) -> Option<(String, OfLimit, f64)> {
-        const TOLERANCE: f64 = 1e-6;
         const JERK_TOLERANCE: f64 = 1e-2;
         let jerk_counts = self.jerk == "limit";
         let each = self.worst_of_limits.iter().flat_map(|(axis, of)| {
