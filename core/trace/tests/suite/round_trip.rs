@@ -1,5 +1,9 @@
 //! What goes in comes out.
 
+use std::cell::RefCell;
+use std::io::{self, BufWriter, Write};
+use std::rc::Rc;
+
 use proptest::prelude::*;
 use tandem_trace::{Ending, Item, KEY_INTERVAL, Writer};
 
@@ -95,4 +99,40 @@ fn what_cannot_be_read_is_not_written() {
     let mut long = header(3, 0);
     long.program = "x".repeat(1 << 17);
     assert!(Writer::new(vec![], &long).is_err());
+}
+
+/// A file whose bytes others see once they are written.
+#[derive(Clone, Default)]
+struct File(Rc<RefCell<Vec<u8>>>);
+
+impl Write for File {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.borrow_mut().write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+#[test]
+fn what_lies_before_a_key_is_in_the_file_while_the_run_goes_on() {
+    let (file, header) = (File::default(), header(3, 0));
+    // More room than is written here: what the file holds has been flushed.
+    let buffer = BufWriter::with_capacity(1 << 20, file.clone());
+    let mut writer = Writer::new(buffer, &header).unwrap();
+    let rows = motion(2 * KEY_INTERVAL + 1);
+    for (number, (sample, _)) in rows.iter().enumerate() {
+        writer.sample(sample, &[]).unwrap();
+        let before_the_key = number as u64 / KEY_INTERVAL * KEY_INTERVAL;
+        if before_the_key == 0 || !number.is_multiple_of(KEY_INTERVAL as usize / 2) {
+            continue;
+        }
+        let (items, ending) = read(&file.0.borrow()).unwrap();
+        assert_eq!(
+            items.len() as u64,
+            before_the_key,
+            "behind sample {number}: {ending:?}"
+        );
+    }
 }
