@@ -490,6 +490,88 @@ pub(super) mod tests {
         }
     }
 
+    /// At half the rate on a plan of 50 mm/s that starts with this acceleration and jerk: what is driven of jerk along the path, mm/s³, by what
+    /// is wanted to keep a feed, mm/s, while the rate changes by `rate_per_s`.
+    fn wanted_path_jerk(feed: f64, rate_per_s: f64, [acceleration, jerk]: [f64; 2]) -> (f64, f64) {
+        let limits = limits(1000.0, 10_000.0);
+        let path = [50.0, acceleration, jerk];
+        let segment = along_x(path, 0.2);
+        let mut horizon = Horizon::new(&limits, 2, PERIOD_S);
+        horizon.fill(&Ahead::new(&segment, Some(0.0), 0, None), PERIOD_S);
+        let mut governor = Governor::new(&limits, 2, PERIOD_S);
+        (governor.sigma, governor.rate_per_s) = (0.5, rate_per_s);
+        let goal = Goal::run(1.0, feed, None);
+        let change = governor.wanted(
+            &Aim {
+                goal,
+                ..to_rest_from(path)
+            },
+            &horizon,
+        );
+        let driven = 0.125 * jerk + 1.5 * rate_per_s * acceleration + 50.0 * change;
+        (driven, change)
+    }
+
+    /// A feed that is met with the acceleration still there asks for more jerk than its approach began with, but no more than
+    /// so many times as much.
+    #[test]
+    fn an_approach_may_end_so_many_times_as_fast_as_it_begins() {
+        // 100 mm/s² are to be gone, or to come to nothing from the other side, within a hundredth of a mm/s.
+        for (feed, rate_per_s) in [(24.99, -2.0), (25.01, 2.0)] {
+            let (driven, _) = wanted_path_jerk(feed, rate_per_s, [0.0, 0.0]);
+            let most = APPROACH_END_FACTOR * ORDER3_LIMIT_SHARE * 10_000.0;
+            let expected = -rate_per_s.signum() * most;
+            assert!((driven - expected).abs() < 1.0, "{driven} of {expected}");
+        }
+    }
+
+    /// Exactly at its feed a rate that does not change goes on so, whatever the plan's own jerk is; one that rises is brought down.
+    #[test]
+    fn at_the_feed_only_what_changes_is_changed() {
+        for jerk in [-1000.0, 0.0, 1000.0] {
+            assert_eq!(wanted_path_jerk(25.0, 0.0, [0.0, jerk]).1, 0.0, "{jerk}");
+        }
+        assert!(wanted_path_jerk(25.0, 0.5, [0.0, 0.0]).0 < -5000.0);
+    }
+
+    /// What is wanted from `sigma` on to a rate of 1 along a plan that starts like `path`, and what the law of the rate says.
+    fn wanted_and_law(sigma: f64, feed_mm_per_s: f64, path: [f64; 3]) -> (f64, f64) {
+        let limits = limits(1000.0, 10_000.0);
+        let segment = along_x(path, 0.2);
+        let mut horizon = Horizon::new(&limits, 2, PERIOD_S);
+        horizon.fill(&Ahead::new(&segment, Some(0.0), 0, None), PERIOD_S);
+        let mut governor = Governor::new(&limits, 2, PERIOD_S);
+        governor.sigma = sigma;
+        let aim = Aim {
+            goal: Goal::run(1.0, feed_mm_per_s, None),
+            ..to_rest_from(path)
+        };
+        let most = ORDER3_LIMIT_SHARE * horizon.rate_change_per_s2;
+        let law = governor.approach(sigma - 1.0, horizon.approach_jerk_share * most, most);
+        (governor.wanted(&aim, &horizon), law)
+    }
+
+    /// Where no feed is asked for, and where the plan stands still, the law of the rate alone says how it comes to its aim.
+    #[test]
+    fn without_a_feed_or_a_speed_the_rate_goes_to_its_aim_by_its_own_law() {
+        for path in [[50.0, 100.0, 1000.0], [50.0, 0.0, 0.0]] {
+            let (wanted, law) = wanted_and_law(0.2, f64::INFINITY, path);
+            assert_eq!(wanted, law, "{path:?}");
+        }
+        let (wanted, law) = wanted_and_law(0.2, 10.0, [0.0, 0.0, 5000.0]);
+        assert_eq!(wanted, law, "from rest");
+    }
+
+    /// With a feed that is far the law of the rate decides near its own aim; far from that too, it only says that it is far.
+    #[test]
+    fn near_its_aim_the_rate_goes_by_its_own_law_though_the_feed_is_far() {
+        let path = [50.0, 0.0, 0.0];
+        let (wanted, law) = wanted_and_law(0.9999, 500.0, path);
+        assert_eq!(wanted, law);
+        let (wanted, law) = wanted_and_law(0.2, 500.0, path);
+        assert!(wanted > law, "{wanted}, {law}");
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
 

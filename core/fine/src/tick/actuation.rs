@@ -305,3 +305,39 @@ impl Actuation {
         self.drives.into_driver()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tandem_rig::Echo;
+    use tandem_sdk::{AxisLimits, Limits};
+
+    /// A sample beyond the jerk limit is refused, but where no rate is known that keeps it.
+    #[test]
+    fn what_no_rate_can_keep_is_not_held_against_a_sample() {
+        let axis = AxisLimits {
+            min_mm: -100.0,
+            max_mm: 100.0,
+            feed_mm_per_s: 100.0,
+            rapid_mm_per_s: 100.0,
+            acceleration_mm_per_s2: 1000.0,
+            jerk_mm_per_s3: 10_000.0,
+            speed_difference_mm_per_s: 0.0,
+        };
+        let config = FineConfig {
+            order: 3,
+            ..FineConfig::new(0.001, Limits::new(&[axis]).unwrap())
+        };
+        // From rest to 100 mm/s² in a period.
+        let jerky = AxisVector::from_slice(&[1e-4]);
+        for is_relaxed in [false, true] {
+            let mut actuation = Actuation::new(&config, Box::new(Echo::default()), None);
+            if is_relaxed {
+                actuation.relax_jerk();
+            }
+            let checked = actuation.check(&jerky, 0);
+            assert_eq!(checked.relaxed, is_relaxed);
+            assert_eq!(checked.breach.is_none(), is_relaxed);
+        }
+    }
+}
