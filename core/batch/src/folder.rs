@@ -7,9 +7,10 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::inputs::{InputError, Inputs, write_whole};
+use crate::inputs::{InputError, Inputs};
 use crate::job::{Build, Job};
 use crate::result::{JobResult, Results};
+use crate::whole::{clear_unfinished, write_whole};
 
 /// A job, and what people call its parts.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -28,12 +29,13 @@ pub struct Folder {
 }
 
 impl Folder {
-    /// The folder at `path`, which is made where it is not there.
+    /// The folder at `path`, which is made where it is not there. What killed processes left unfinished there is removed.
     ///
     /// # Errors
     /// It cannot be made.
     pub fn create(path: &Path) -> Result<Self, String> {
         fs::create_dir_all(path).map_err(|e| format!("{}: {e}", path.display()))?;
+        clear_unfinished(path);
         Ok(Self {
             path: path.to_owned(),
         })

@@ -5,14 +5,15 @@
 //! make the machine again.
 
 use std::fs::{self, File};
-use std::io::{self, Read, Write};
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use tandem_machine::{Machine, MachineError};
-use tempfile::{NamedTempFile, TempDir};
+use tempfile::TempDir;
 
 use crate::hash::sha256;
 use crate::job::Job;
+use crate::whole::{clear_unfinished, write_whole};
 
 /// Before the hash of a file, in the text of a machine.
 const FILE: &str = "sha256:";
@@ -50,13 +51,14 @@ pub struct Inputs {
 }
 
 impl Inputs {
-    /// The inputs in `folder`, which is made where it is not there.
+    /// The inputs in `folder`, which is made where it is not there. What killed processes left unfinished there is removed.
     ///
     /// # Errors
     /// It cannot be made.
     pub fn open(folder: &Path) -> Result<Self, InputError> {
         let of_folder = |e: io::Error| at(folder.display().to_string(), e);
         fs::create_dir_all(folder).map_err(of_folder)?;
+        clear_unfinished(folder);
         Ok(Self {
             folder: fs::canonicalize(folder).map_err(of_folder)?,
             here: tempfile::tempdir().map_err(of_folder)?,
@@ -247,18 +249,6 @@ impl Inputs {
         let text = String::from_utf8(self.get(hash)?).map_err(|e| at(hash, e))?;
         Ok(Some(text))
     }
-}
-
-/// Writes `bytes` to `path` so that whoever looks finds nothing or all of it, however many write it at once.
-///
-/// # Errors
-/// The system's words.
-pub fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let folder = path.parent().unwrap_or(Path::new("."));
-    let mut file = NamedTempFile::new_in(folder)?;
-    file.write_all(bytes)?;
-    file.persist(path)?;
-    Ok(())
 }
 
 /// Where a machine file names files: tables, and the key in them. `*` stands for any name.

@@ -16,10 +16,11 @@ mod simulate;
 mod space;
 mod table;
 mod tune;
+mod whole;
 
 pub use folder::{Folder, Listed, files};
 pub use hash::{sha256, sha256_of_file};
-pub use inputs::{InputError, Inputs, write_whole};
+pub use inputs::{InputError, Inputs};
 pub use job::{Build, FORMAT, Job, shown};
 pub use local::{Bench, MAX_TRIES, Shard};
 pub use result::{Ended, JobResult, Results, numbers_of};
@@ -29,3 +30,4 @@ pub use simulate::{PROGRAM, Plugins, simulate, simulate_with};
 pub use space::{Parameter, Values, grid};
 pub use table::Table;
 pub use tune::{Keep, Task, Tried, Tuned, WorstDeviation, key_of, set_of, tune};
+pub use whole::write_whole;

@@ -8,8 +8,9 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use tandem_recorder::Summary;
 
-use crate::inputs::{read_at_most, write_whole};
+use crate::inputs::read_at_most;
 use crate::job::{Build, FORMAT, Job};
+use crate::whole::{clear_unfinished, write_whole};
 
 /// What comes out of a job. The same job gives the same text on every computer with the same [`Build`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -122,12 +123,14 @@ pub struct Results {
 }
 
 impl Results {
-    /// The results of `build` in `folder`, which is made where it is not there.
+    /// The results of `build` in `folder`, which is made where it is not there. What killed processes left unfinished there is
+    /// removed.
     ///
     /// # Errors
     /// It cannot be made.
     pub fn open(folder: &Path, build: Build) -> Result<Self, String> {
         fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+        clear_unfinished(folder);
         let folder = folder.to_owned();
         Ok(Self { folder, build })
     }
