@@ -242,3 +242,133 @@ pub fn corner_error_mm(
 pub fn tau_for_tolerance_s(error_mm: f64, feed_mm_per_s: f64, turn_rad: f64) -> f64 {
     4.0 * error_mm / (feed_mm_per_s * (turn_rad / 2.0).sin())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::options::Options;
+
+    fn rules() -> Rules {
+        let axis = tandem_rig::axis(1000.0);
+        Rules::new(&Options::default(), &tandem_rig::context(&[axis; 2], 0.001))
+    }
+
+    /// A block that may stand off its path by 0.05 mm.
+    fn block(curvature_per_mm: f64) -> Entry {
+        Entry {
+            tolerance_mm: 0.05,
+            curvature_per_mm,
+            ..Entry::blank()
+        }
+    }
+
+    /// What blocks lose at a corner and by their curvatures is what the tolerance leaves beside the chords of the samples.
+    #[test]
+    fn the_span_takes_all_of_the_tolerance() {
+        let rules = rules();
+        let sag_mm = rules.sag_mm;
+        for (squares, curvatures) in [
+            (2.0, [0.0, 0.0]),
+            (0.5, [0.02, 0.0]),
+            (0.0, [0.05, 0.2]),
+            (2.0, [0.3, 0.1]),
+        ] {
+            let [before, after] = curvatures.map(block);
+            let span = span_mm(&rules, &before, &after, squares);
+            let sharp = span * f64::sqrt(squares) / 8.0;
+            let curved = CURVED * span * span * (curvatures[0] + curvatures[1]) / 64.0;
+            let lost = sharp + curved + sag_mm;
+            assert!(
+                (lost - 0.05).abs() < 1e-9,
+                "{squares} {curvatures:?}: {lost}"
+            );
+        }
+        // The stricter of both counts. What leaves nothing beside the chords allows a straight junction only.
+        let strict = Entry {
+            tolerance_mm: 0.01,
+            ..block(0.0)
+        };
+        let spans = [(block(0.0), strict.clone()), (strict, block(0.0))];
+        for (before, after) in spans {
+            let span = span_mm(&rules, &before, &after, 2.0);
+            assert!((span * f64::sqrt(2.0) / 8.0 + sag_mm - 0.01).abs() < 1e-9);
+        }
+        let none = |curvature| Entry {
+            tolerance_mm: sag_mm,
+            ..block(curvature)
+        };
+        let straight = span_mm(&rules, &none(0.0), &none(0.0), 0.0);
+        assert_eq!(straight, f64::INFINITY);
+        assert_eq!(span_mm(&rules, &none(0.0), &none(0.0), 1e-6), 0.0);
+        assert_eq!(span_mm(&rules, &none(0.1), &none(0.0), 0.0), 0.0);
+    }
+
+    /// n ticks of overlap take `n + 1/n` ticks of travel.
+    #[test]
+    fn an_overlap_has_the_most_ticks_that_its_span_takes() {
+        for ticks in 1..50 {
+            let ticks = f64::from(ticks);
+            let needed = ticks + 1.0 / ticks;
+            assert_eq!(max_ticks(needed * (1.0 + 1e-9)), ticks);
+            assert_eq!(
+                max_ticks(needed * (1.0 - 1e-6)),
+                if ticks > 1.0 { ticks - 1.0 } else { 0.0 }
+            );
+        }
+    }
+
+    /// The cap takes the share of turning in the overlap that it allows: that of the room or the longest one.
+    #[test]
+    fn the_cap_takes_all_of_the_share_of_turning() {
+        for (turn, room_mm, longest_s, bend) in [
+            (2e-3, 1.0, 0.1, 0.0),
+            (2e-3, 1.0, 0.01, 0.0),
+            (2e-3, 1.0, 0.1, 1e-4),
+            (2e-3, 1.0, 0.01, 1e-4),
+            (0.0, 1.0, 0.01, 1e-4),
+            (2e-3, 1.0, f64::INFINITY, 1e-4),
+        ] {
+            let cap = cap_mm_per_s(turn, room_mm, longest_s, bend);
+            let overlap_s = longest_s.min(room_mm / cap);
+            let share = cap * turn / overlap_s + bend * cap * cap;
+            assert!(
+                (share - TURN_SHARE).abs() < 1e-9,
+                "{turn} {longest_s} {bend}: {share}"
+            );
+        }
+        assert_eq!(cap_mm_per_s(0.0, 1.0, 0.1, 0.0), f64::INFINITY);
+        assert_eq!(cap_mm_per_s(2e-3, 0.0, 0.1, 0.0), 0.0);
+    }
+
+    /// At the lifted feed turning with the slower block's and the change to it take what arcs leave of the acceleration.
+    #[test]
+    fn a_lifted_feed_takes_all_of_the_overlap() {
+        let corner = Corner {
+            turn_s2_per_mm: 4e-4,
+            room_mm: 2.0,
+            longest_s: 0.03,
+            cap_mm_per_s: 1000.0,
+            spare: 0.7,
+            ..Corner::default()
+        };
+        for slow in [5.0, 30.0, 45.0] {
+            for slope in [1e-3, 3e-3] {
+                let fast = corner.lift_mm_per_s(slow, slope);
+                let overlap_s = f64::min(corner.longest_s, corner.room_mm / fast);
+                let taken_s = slow * corner.turn_s2_per_mm + (fast - slow) * slope;
+                assert!(
+                    (taken_s / (corner.spare * overlap_s) - 1.0).abs() < 1e-9,
+                    "{slow} {slope}"
+                );
+            }
+        }
+        let capped = Corner {
+            cap_mm_per_s: 20.0,
+            ..corner
+        };
+        assert_eq!(capped.lift_mm_per_s(5.0, 1e-3), 20.0);
+        assert_eq!(corner.lift_mm_per_s(5.0, 0.0), 1000.0);
+        // A slower block that takes more than there is lifts nothing.
+        assert_eq!(corner.lift_mm_per_s(200.0, 1e-3), 200.0);
+    }
+}

@@ -203,3 +203,143 @@ fn bent_share(blocks: [&Entry; 2], overlap_s: f64) -> f64 {
     let one = |block: &Entry| block.bend * (overlap_s / block.slope_s2_per_mm).powi(2);
     ARC_OVERLAP * (one(blocks[0]) + one(blocks[1]))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::options::{CornerControl, Options};
+    use tandem_sdk::AxisVector;
+
+    /// Without corner control overlaps are as long as the time constant.
+    fn rules() -> Rules {
+        let options = Options {
+            corner_control: CornerControl::Off,
+            ..Options::default()
+        };
+        let axis = tandem_rig::axis(1000.0);
+        Rules::new(&options, &tandem_rig::context(&[axis; 2], 0.001))
+    }
+
+    /// 10 mm along `direction` at a path acceleration of 1000 mm/s².
+    fn block(direction: [f64; 2], bend: f64) -> Entry {
+        Entry {
+            length_mm: 10.0,
+            slope_s2_per_mm: 1e-3,
+            bend,
+            directions: [AxisVector::from_slice(&direction); 2],
+            ..Entry::blank()
+        }
+    }
+
+    fn corner(turn_s2_per_mm: f64) -> Corner {
+        Corner {
+            turn_s2_per_mm,
+            tau_s: 0.02,
+            longest_s: 0.02,
+            span_mm: 10.0,
+            ..Corner::default()
+        }
+    }
+
+    /// A straight block and one that bends, with these feeds.
+    fn joined(corner: &Corner, bend: f64, feeds: [f64; 2], mode: Mode) -> Join {
+        let (straight, curved) = (block([1.0, 0.0], 0.0), block([1.0, 0.0], bend));
+        Join::new(&rules(), corner, [&straight, &curved], feeds, mode)
+    }
+
+    /// A stop in full overlap has what turning with the faster feed and arcs leave, at least what is left of their share.
+    #[test]
+    fn a_stop_in_full_overlap_has_what_turning_leaves() {
+        for (turn, bend, feeds, left) in [
+            // 50 mm/s in 20 ms turn by half of the acceleration.
+            (2e-4, 0.0, [50.0, 30.0], 0.5),
+            (2e-4, 0.0, [30.0, 50.0], 0.5),
+            (1e-4, 1e-4, [50.0, 50.0], 1.0 - 0.25 - ARC_OVERLAP * 0.25),
+            (2e-4, 1e-4, [50.0, 50.0], MIN_STOP),
+        ] {
+            let join = joined(&corner(turn), bend, feeds, Mode::Flow);
+            assert_eq!([join.down_s, join.up_s, join.overlap_s], [0.02; 3]);
+            assert!((join.stop_mm_per_s2 - left * 1000.0).abs() < 1e-6, "{left}");
+        }
+    }
+
+    /// A stop in a late start has what turning leaves; where that is too little, the half of a ramp after a short overlap, and after
+    /// a long one what is left of the share of turning.
+    #[test]
+    fn a_stop_in_a_late_start_has_what_turning_or_the_ramp_leaves() {
+        // Ramps of 40 ms; the time constant allows 20 ms of overlap, half of them.
+        let feeds = [40.0, 40.0];
+        for (turn, bend, left) in [
+            (3e-4, 0.0, 0.7),
+            (7.5e-4, 0.0, HALF),
+            (9e-4, 0.0, HALF),
+            // 20 ms at 1000 mm/s² are 20 mm/s: the arc takes 0.24 of the acceleration.
+            (2e-4, 4e-4, 1.0 - 0.2 - ARC_OVERLAP * 4e-4 * 400.0),
+        ] {
+            let join = joined(&corner(turn), bend, feeds, Mode::Late);
+            assert_eq!([join.down_s, join.up_s], [0.04; 2]);
+            assert!((join.overlap_s - 0.02).abs() < 1e-12, "{}", join.overlap_s);
+            assert!(
+                (join.stop_mm_per_s2 - left * 1000.0).abs() < 1e-6,
+                "{turn} {bend}"
+            );
+        }
+        // An overlap of 30 ms beside 40 ms leaves less than half.
+        let long = Corner {
+            longest_s: 0.03,
+            ..corner(7.5e-4)
+        };
+        let join = joined(&long, 0.0, feeds, Mode::Late);
+        assert!((join.overlap_s - 0.03).abs() < 1e-12, "{}", join.overlap_s);
+        assert!((join.stop_mm_per_s2 - 250.0).abs() < 1e-6);
+    }
+
+    /// What a late start may overlap is bounded by the tolerance, `o² ≤ h·span`, and by what the axes have when both ramps
+    /// meet.
+    #[test]
+    fn a_late_start_overlaps_as_tolerance_and_axes_allow() {
+        let overlap_s = |corner: &Corner, after: &Entry| {
+            late_overlap_s(&rules(), corner, [&block([1.0, 0.0], 0.0), after], 0.04)
+        };
+        let straight = block([1.0, 0.0], 0.0);
+        let narrow = Corner {
+            span_mm: 0.1,
+            ..corner(3e-4)
+        };
+        assert!((overlap_s(&narrow, &straight) - 0.01).abs() < 1e-12);
+        let open = Corner {
+            longest_s: f64::INFINITY,
+            ..corner(3e-4)
+        };
+        assert!((overlap_s(&open, &straight) - 0.04).abs() < 1e-12);
+        // Turning takes more than its share: half of the ramp.
+        let turning = Corner {
+            turn_s2_per_mm: 9e-4,
+            ..open
+        };
+        assert!((overlap_s(&turning, &straight) - 0.02).abs() < 1e-12);
+        // Back along its way an axis needs twice what it has.
+        assert_eq!(overlap_s(&open, &block([-1.0, 0.0], 0.0)), 0.0);
+        // 1.5 · bend · (o/slope)² of an arc comes to half of the share that turning leaves.
+        let bend = 0.5 / (ARC_OVERLAP * 400.0);
+        let found_s = overlap_s(&open, &block([1.0, 0.0], bend));
+        assert!((found_s - 0.02).abs() < 1e-9, "{found_s}");
+    }
+
+    /// The shortest overlap takes the change of feed and turning together, or turning with its share alone.
+    #[test]
+    fn the_shortest_overlap_is_what_the_axes_need() {
+        let spare = 0.8;
+        let corner = Corner {
+            spare,
+            ..corner(4e-4)
+        };
+        let straight = block([1.0, 0.0], 0.0);
+        for feeds in [[50.0, 20.0], [20.0, 50.0]] {
+            let found_s = needed_s(&corner, [&straight; 2], feeds);
+            assert!((found_s - (20.0 * 4e-4 + 30.0 * 1e-3) / spare).abs() < 1e-12);
+        }
+        let found_s = needed_s(&corner, [&straight; 2], [50.0, 49.0]);
+        assert!((found_s - 50.0 * 4e-4 / (TURN_SHARE - 0.2)).abs() < 1e-12);
+    }
+}
