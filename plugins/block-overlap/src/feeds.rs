@@ -7,10 +7,13 @@ use crate::entry::Entry;
 use crate::join::{Mode, late_overlap_s, rest_ramp_s};
 use crate::rules::{Rules, TURN_SHARE, greater, lesser};
 
-/// How many further plans are tried where much time may be won.
+/// How many further plans are tried where much time may be won. With half of them a plan of four blocks takes up to 1.2 % longer
+/// than the fastest of all, where it takes 0.9 % (`a_plan_of_few_blocks_is_nearly_the_fastest_of_all`); twice as many find no
+/// faster one.
 const ROUNDS: usize = 4;
 
-/// Share of its ramp that a block loses where it is worth another plan.
+/// Share of its ramp that a block loses where it is worth another plan. With twice as much a plan of four blocks takes up to 1.1 %
+/// longer than the fastest of all (the same test); half of it finds no faster one.
 const RAMP_SHARE: f64 = 0.1;
 
 /// Share of a plan's time that is much.
@@ -473,4 +476,69 @@ fn ramped_mm_per_s(block: &Entry, taus_s: [f64; 2]) -> f64 {
         block.triangle_mm_per_s,
         lesser(one(taus_s[0]), one(taus_s[1])),
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::buffer::Buffer;
+    use crate::options::Options;
+    use tandem_rig::{Random, axis, context, lines};
+    use tandem_sdk::AxisVector;
+
+    /// A plan decides at one junction after the other. Of every other way to join four blocks none is faster by more than a
+    /// hundredth, and hardly one by anything.
+    #[test]
+    fn a_plan_of_few_blocks_is_nearly_the_fastest_of_all() {
+        let rules = Rules::new(
+            &Options::default(),
+            &context(&[axis(1000.0), axis(600.0)], 0.001),
+        );
+        let tau_s = 0.04;
+        let (mut worst, mut sum) = (0.0f64, 0.0);
+        for seed in 1..=200 {
+            let mut random = Random::new(seed);
+            let mut points = vec![AxisVector::ZERO];
+            let mut heading = 0.0f64;
+            for _ in 0..4 {
+                heading += random.between(-1.2, 1.2);
+                let length = random.between(0.5, 8.0);
+                let step = [length * heading.cos(), length * heading.sin()];
+                points.push(*points.last().unwrap() + AxisVector::from_slice(&step));
+            }
+            let feeds = [0; 4].map(|_| random.between(600.0, 9000.0));
+            let mut buffer = Buffer::new(8, tau_s);
+            for block in lines(&points, |k| feeds[k]) {
+                buffer.push(&rules, |entry| entry.set(&block, &rules, [tau_s; 2]));
+            }
+            let ring = buffer.ring();
+            let before = Before {
+                feed_mm_per_s: None,
+                tau_s,
+            };
+            let mut plan = Plan::new(8);
+            assert!(plan.make(&rules, ring, &before));
+            let found_s = plan.time_s(&rules, ring, tau_s);
+            let mut best_s = f64::INFINITY;
+            plan.capped = false;
+            for ways in 0..8 {
+                let mode = |k: usize| {
+                    if ways >> k & 1 == 0 {
+                        Mode::Flow
+                    } else {
+                        Mode::Late
+                    }
+                };
+                plan.modes = vec![mode(0), mode(1), mode(2), Mode::Rest];
+                if plan.settle(&rules, ring) {
+                    best_s = best_s.min(plan.time_s(&rules, ring, tau_s));
+                }
+            }
+            worst = worst.max(found_s / best_s);
+            sum += found_s / best_s;
+        }
+        let mean = sum / 200.0;
+        println!("worst {worst:.4}, mean {mean:.5} of the fastest");
+        assert!(worst < 1.01 && mean < 1.0002);
+    }
 }
