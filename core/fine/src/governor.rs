@@ -77,7 +77,8 @@
 //! little turn, passed at a speed at which samples keep the jerk limit. The rough loop flags segments that begin so
 //! (`SegmentFlags::STEPS`). With Δv and Δa those steps, samples show up to σ·Δv/T as acceleration and σ·Δv/T² +
 //! 0.75·σ²·Δa/T as jerk, which no single point has, in the differences of three samples. In the periods around such a
-//! place, two before it and two behind, the governor leaves that out of what it uses.
+//! place, two before it and two behind, the governor leaves that out of what it uses, and with it what the plan uses of the
+//! jerk on the other side: one sample shows both.
 //!
 //! Asked for is a path speed, ratio × programmed feed, not a scale: a corner that is slower than that anyway runs as
 //! planned. Behind it the plan, which is made at `max_feed_ratio`, may be too fast; so with a jerk limit σ is taken only to

@@ -3,7 +3,7 @@
 //! A plan may pass a jump of its curvature or a turn too small to rest at. The differences of samples show such a step for
 //! three samples, beside what the rate of program time does meanwhile: in the periods around it that has the less.
 
-use tandem_sdk::{MAX_AXES, Segment};
+use tandem_sdk::{MAX_AXES, Segment, derivatives};
 
 /// Share of its step by which acceleration is in the worst third difference of four samples, times the period.
 const WORST: f64 = 0.75;
@@ -11,10 +11,30 @@ const WORST: f64 = 0.75;
 pub const AROUND: u8 = 2;
 
 /// Steps per axis, summed up.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Steps {
     velocity: [f64; MAX_AXES],
     acceleration: [f64; MAX_AXES],
+    /// The largest jerk of the plan beside one of them, mm/s³.
+    jerk: [f64; MAX_AXES],
+    /// How long the shortest of the segments beside them is, s: that far the plan has the jerk beside them.
+    beside_s: f64,
+}
+
+impl Default for Steps {
+    fn default() -> Self {
+        Self {
+            velocity: [0.0; MAX_AXES],
+            acceleration: [0.0; MAX_AXES],
+            jerk: [0.0; MAX_AXES],
+            beside_s: f64::INFINITY,
+        }
+    }
+}
+
+/// Jerk of each axis in `segment` at the local time `t_s`, mm/s³.
+fn jerk(segment: &Segment, t_s: f64) -> [f64; MAX_AXES] {
+    std::array::from_fn(|axis| derivatives(&segment.coefficients[axis], t_s)[2].abs())
 }
 
 impl Steps {
@@ -22,9 +42,12 @@ impl Steps {
     pub fn between(before: &Segment, behind: &Segment) -> Self {
         let velocity = behind.velocity(0.0) - before.velocity(before.duration_s);
         let acceleration = behind.acceleration(0.0) - before.acceleration(before.duration_s);
+        let (jerk_before, jerk_behind) = (jerk(before, before.duration_s), jerk(behind, 0.0));
         Self {
             velocity: velocity.0.map(f64::abs),
             acceleration: acceleration.0.map(f64::abs),
+            jerk: std::array::from_fn(|axis| jerk_before[axis].max(jerk_behind[axis])),
+            beside_s: before.duration_s.min(behind.duration_s),
         }
     }
 
@@ -37,6 +60,8 @@ impl Steps {
         Self {
             velocity: velocity.0.map(f64::abs),
             acceleration: acceleration.0.map(f64::abs),
+            jerk: jerk(before, before.duration_s),
+            beside_s: before.duration_s,
         }
     }
 
@@ -45,7 +70,9 @@ impl Steps {
         for axis in 0..MAX_AXES {
             self.velocity[axis] += other.velocity[axis];
             self.acceleration[axis] += other.acceleration[axis];
+            self.jerk[axis] = self.jerk[axis].max(other.jerk[axis]);
         }
+        self.beside_s = self.beside_s.min(other.beside_s);
     }
 
     /// Acceleration of `axis` that samples show for them at the rate `sigma`, mm/s².
@@ -53,8 +80,26 @@ impl Steps {
         sigma * self.velocity[axis] / period_s
     }
 
+    /// Jerk that may be driven of `axis` beside them at the rate `sigma`, mm/s³, where samples may show `most`. On top of a step samples show
+    /// a mean of what is driven before it and behind it: what the plan itself uses on one side is not left on the other. Where a segment
+    /// beside them is shorter than samples look, the one beyond it may use all of it.
+    pub fn left_of_jerk_mm_per_s3(&self, axis: usize, sigma: f64, period_s: f64, most: f64) -> f64 {
+        let step = self.jerk_mm_per_s3(axis, sigma, period_s);
+        if step == 0.0 {
+            return most;
+        }
+        let is_known = self.beside_s >= f64::from(AROUND) * sigma * period_s;
+        let planned = if is_known {
+            (sigma * sigma * sigma * self.jerk[axis]).min(most)
+        } else {
+            most
+        };
+        let left = most - step;
+        left.min(2.0 * left - planned)
+    }
+
     /// Jerk of `axis` that samples show for them at the rate `sigma`, mm/s³.
-    pub fn jerk_mm_per_s3(&self, axis: usize, sigma: f64, period_s: f64) -> f64 {
+    fn jerk_mm_per_s3(&self, axis: usize, sigma: f64, period_s: f64) -> f64 {
         sigma * (self.velocity[axis] / period_s + WORST * sigma * self.acceleration[axis])
             / period_s
     }
@@ -112,6 +157,39 @@ mod tests {
         let mut twice = steps;
         twice.join(&steps);
         assert!((twice.jerk_mm_per_s3(1, 0.5, 0.001) - 2.0 * jerk).abs() < 1e-6);
+    }
+
+    /// Segments of 0.5 s on both sides of a step of the acceleration by 8 mm/s² use 900 mm/s³ before it and 100 mm/s³ behind it.
+    #[test]
+    fn the_jerk_that_the_plan_uses_on_one_side_of_a_step_is_not_left_on_the_other() {
+        let segment = |[velocity, acceleration, jerk]: [f64; 3], duration_s: f64| {
+            let mut segment = Segment::rest(&AxisVector::ZERO, duration_s);
+            segment.coefficients[0] = [0.0, velocity, acceleration / 2.0, jerk / 6.0, 0.0, 0.0];
+            segment
+        };
+        let (sigma, period_s, most) = (0.9, 0.01, 1000.0);
+        let step = WORST * sigma * sigma * 8.0 / period_s;
+        let left = |before_s: f64, planned: f64| {
+            let came = [
+                planned * before_s * before_s / 2.0,
+                -planned * before_s,
+                planned,
+            ];
+            let before = segment(came, before_s);
+            let steps = Steps::between(&before, &segment([0.0, 8.0, 100.0], 0.5));
+            assert_eq!(
+                steps.left_of_jerk_mm_per_s3(1, sigma, period_s, most),
+                most,
+                "an axis without a step has all of it"
+            );
+            steps.left_of_jerk_mm_per_s3(0, sigma, period_s, most)
+        };
+        // The mean of both sides is what the step leaves.
+        let used = sigma.powi(3) * 900.0;
+        assert!((f64::midpoint(left(0.5, 900.0), used) - (most - step)).abs() < 1e-9);
+        assert!((left(0.5, 200.0) - (most - step)).abs() < 1e-9);
+        // What comes before a short segment may use all of the limit.
+        assert!((left(0.01, 200.0) - (most - 2.0 * step)).abs() < 1e-9);
     }
 
     #[test]

@@ -269,7 +269,8 @@ impl WaySearch {
         for (axis, (acceleration_limit, jerk_limit)) in horizon.limits() {
             let velocity = motion.velocity[axis];
             let acceleration = motion.acceleration[axis];
-            let left = share * JERK_SHARE * jerk_limit - reserve.jerk_mm_per_s3(axis, at.sigma, h);
+            let most = share * JERK_SHARE * jerk_limit;
+            let left = reserve.left_of_jerk_mm_per_s3(axis, at.sigma, h, most);
             let planned = [velocity, acceleration, motion.jerk[axis]];
             keep.keep_jerk(planned, &at, (left, jerk_limit), 0.0);
             let left = share * ACCELERATION_SHARE * acceleration_limit

@@ -373,7 +373,8 @@ impl Governor {
             };
             let motion = &point.motion;
             for (axis, (_, limit)) in horizon.limits() {
-                let left = ORDER3_LIMIT_SHARE * limit - reserve.jerk_mm_per_s3(axis, at.sigma, h);
+                let most = ORDER3_LIMIT_SHARE * limit;
+                let left = reserve.left_of_jerk_mm_per_s3(axis, at.sigma, h, most);
                 let planned = [
                     motion.velocity[axis],
                     motion.acceleration[axis],
