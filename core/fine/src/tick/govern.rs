@@ -8,6 +8,7 @@ use crate::governor::tuning::{
 use tandem_rings::STOP_SHARE;
 
 use super::pieces::{Bounds, Laid};
+use super::ratio::{FEED_TOLERANCE, Ratios, within};
 use crate::config::{FineConfig, GuardMode};
 use crate::cursor::Cursor;
 use crate::governor::{Aim, Goal, Governor, RestAt};
@@ -25,16 +26,6 @@ pub(super) enum Ask {
     /// For good: an edge has come, or the operator aborts.
     Stop,
     Starve,
-}
-
-/// The feed ratios that count now.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Ratios {
-    /// At the end of the period.
-    pub(super) feed: f64,
-    /// The mean of that over the period: on the way down a period that ends at its ratio is not to end below it.
-    pub(super) mean_feed: f64,
-    pub(super) rapid: f64,
 }
 
 /// What a fine period is asked for, and what the queue allows in it.
@@ -752,18 +743,6 @@ impl PlanFollower {
         }
     }
 }
-
-/// The rate at which a planned speed is at most `allowed`; 1 where it is anyway, to the rounding of a long path.
-pub(super) fn within(allowed: f64, planned_mm_per_s: f64) -> f64 {
-    if planned_mm_per_s * (1.0 - FEED_TOLERANCE) > allowed {
-        allowed / planned_mm_per_s
-    } else {
-        1.0
-    }
-}
-
-/// Relative tolerance on the feed.
-const FEED_TOLERANCE: f64 = 1e-7;
 
 #[cfg(test)]
 #[path = "govern_tests.rs"]

@@ -158,14 +158,6 @@ fn the_feed_of_a_line_counts_to_its_end() {
     assert!(follower.govern(request(Ask::Run)).delta_s > 0.5 * PERIOD_S * (1.0 + 1e-6));
 }
 
-#[test]
-fn a_rate_is_lowered_where_the_plan_is_above_what_is_allowed() {
-    assert_eq!(within(10.0, 5.0), 1.0);
-    assert_eq!(within(10.0, 10.0 * (1.0 + 1e-8)), 1.0);
-    assert_eq!(within(10.0, 20.0), 0.5);
-    assert_eq!(within(0.0, 20.0), 0.0);
-}
-
 /// Where the axes go a longer way than the path coordinate says, by a margin more than that; not where that is no measure of it.
 #[test]
 fn the_way_of_a_period_is_longer_by_what_the_axes_go_beyond_the_path() {

@@ -6,7 +6,7 @@
 
 use tandem_sdk::{Segment, SegmentFlags};
 
-use super::govern::{Ratios, within};
+use super::ratio::{Ratios, within};
 use crate::governor::Governor;
 use crate::governor::tuning::ABOVE_FEED_SHARE;
 use crate::period_points::PeriodPoints;

@@ -6,10 +6,10 @@ use rtrb::Consumer;
 use tandem_rings::{Depth, OperatorInputs, Queued, Ratio};
 use tandem_sdk::{AxisVector, StopOn};
 
-use super::govern::{Ask, Governed, PlanFollower, Ratios, Request};
+use super::govern::{Ask, Governed, PlanFollower, Request};
 use super::progress::Progress;
 use super::queue::QueueWatch;
-use super::ratio::StrategyRatio;
+use super::ratio::{Ratios, StrategyRatio};
 use crate::config::FineConfig;
 use crate::cursor::{Cursor, Reached};
 use crate::fault::FaultKind;

@@ -7,9 +7,30 @@
 use rtrb::Consumer;
 use tandem_rings::{OperatorInputs, Ratio};
 
-use super::govern::Ratios;
 use crate::config::FineConfig;
 use crate::outputs::Outputs;
+
+/// Relative tolerance on the feed.
+pub(super) const FEED_TOLERANCE: f64 = 1e-7;
+
+/// The feed ratios that count now.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ratios {
+    /// At the end of the period.
+    pub(super) feed: f64,
+    /// The mean of that over the period: on the way down a period that ends at its ratio is not to end below it.
+    pub(super) mean_feed: f64,
+    pub(super) rapid: f64,
+}
+
+/// The rate at which a planned speed is at most `allowed`; 1 where it is anyway, to the rounding of a long path.
+pub(super) fn within(allowed: f64, planned_mm_per_s: f64) -> f64 {
+    if planned_mm_per_s * (1.0 - FEED_TOLERANCE) > allowed {
+        allowed / planned_mm_per_s
+    } else {
+        1.0
+    }
+}
 
 /// A ratio on its way.
 #[derive(Clone, Copy, Debug)]
@@ -142,6 +163,14 @@ impl StrategyRatio {
 mod tests {
     use super::*;
     use rtrb::RingBuffer;
+
+    #[test]
+    fn a_rate_is_lowered_where_the_plan_is_above_what_is_allowed() {
+        assert_eq!(within(10.0, 5.0), 1.0);
+        assert_eq!(within(10.0, 10.0 * (1.0 + 1e-8)), 1.0);
+        assert_eq!(within(10.0, 20.0), 0.5);
+        assert_eq!(within(0.0, 20.0), 0.0);
+    }
 
     /// What acts, where these ratios are queued, each for its tick, and take four periods.
     fn strategy(ratios: &[(u64, f64)]) -> StrategyRatio {
