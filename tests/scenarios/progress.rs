@@ -169,6 +169,31 @@ fn every_pair_of_periods_ends_with_every_planner() {
     );
 }
 
+#[test]
+fn a_line_ends_where_building_up_the_acceleration_takes_thousands_of_rough_periods() {
+    for planner in ["smooth", "nurbs"] {
+        for jerk in [500, 2000] {
+            let settings = settings(&[
+                ("loops.fine_period_ms", "0.25".to_string()),
+                ("loops.rough_period_ms", "0.25".to_string()),
+                ("axes.x.max_jerk_mm_per_s3", jerk.to_string()),
+                ("planner.plugin", planner.to_string()),
+            ]);
+            let ran = Bench::text("G21 G90\nG1 X10 F600\nM2\n")
+                .on(&root().join("examples/machines/mill-3axis-smooth.toml"))
+                .try_run_with(&settings, "")
+                .unwrap_or_else(|error| panic!("{planner}, {jerk} mm/s³: {error}"));
+            expect_end(&ran, 0.25)
+                .unwrap_or_else(|cause| panic!("{planner}, {jerk} mm/s³: {cause}"));
+            let end_mm = ran.samples.last().map(|sample| sample.command[0]);
+            assert!(
+                end_mm.is_some_and(|end_mm| (end_mm - 10.0).abs() < 1e-9),
+                "{planner}, {jerk} mm/s³: {end_mm:?}"
+            );
+        }
+    }
+}
+
 /// Nothing stopped it, and it took no longer than the program could.
 fn expect_end(ran: &Ran, fine_ms: f64) -> Result<(), String> {
     let summary = &ran.outcome.summary;
