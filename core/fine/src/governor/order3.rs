@@ -460,6 +460,29 @@ pub(super) mod tests {
         assert!((-60_000.0..-11_000.0).contains(&jerk), "{jerk} mm/s³");
     }
 
+    /// Too fast for its limit to bring σ̇ down before the end of the range, the jerk goes beyond it evenly, and not all at once there.
+    #[test]
+    fn the_rate_comes_to_an_end_of_its_range_without_a_step() {
+        const SPEED: f64 = 50.0;
+        let limits = limits(1000.0, 10_000.0);
+        let segment = along_x([SPEED, 0.0, 0.0], 10.0);
+        let mut horizon = Horizon::new(&limits, 2, PERIOD_S);
+        horizon.fill(&Ahead::new(&segment, Some(0.0), 0, None), PERIOD_S);
+        for (from, rate, end) in [(0.99, 2.5, 1.0), (0.01, -2.5, 0.0)] {
+            let mut governor = Governor::new(&limits, 2, PERIOD_S);
+            (governor.sigma, governor.rate_per_s) = (from, rate);
+            for _ in 0..20 {
+                let before = governor.rate_per_s();
+                governor.relaxed(&horizon, &Steps::default());
+                let jerk = SPEED * (governor.rate_per_s() - before) / PERIOD_S;
+                assert!(jerk.abs() < 20_000.0, "{jerk} mm/s³ towards {end}");
+            }
+            assert_eq!(governor.rate_per_s().abs(), 0.0);
+            let short = (governor.sigma() - end).abs();
+            assert!(short <= PERIOD_S * rate.abs(), "{short} short of {end}");
+        }
+    }
+
     /// Where a period may change much of the rate, the end of its approach to 1 is not taken where the plan is a little faster than the feed.
     #[test]
     fn the_end_of_an_approach_keeps_the_feed() {
