@@ -4,7 +4,7 @@ use crate::{
     Options, Position,
     follow::{self, Followed},
     geometry::{distance, distance_to_chord},
-    path::{Element, PathPosition},
+    path::{Element, PathPosition, Shape},
 };
 
 /// Chords searched on each side of a vertex; only samples astray or all but at rest come in greater numbers.
@@ -69,6 +69,11 @@ pub fn vertices(elements: &[Element], followed: &Followed, options: &Options) ->
             }
             off_mm = off_mm.min(laid.distance_of_all_mm(index, ranges));
         }
+        let limit_mm = if off_mm > limit_mm {
+            laid.limit_beside_corners_mm(index, options)
+        } else {
+            limit_mm
+        };
         let (line, exact_stop) = (element.line, element.exact_stop);
         Some(Vertex {
             line,
@@ -94,6 +99,15 @@ pub fn lengths_mm(elements: &[Element]) -> Vec<f64> {
 pub fn length_to_mm(lengths_mm: &[f64], place: PathPosition) -> f64 {
     let start_mm = lengths_mm[place.element];
     start_mm + place.fraction * (lengths_mm[place.element + 1] - start_mm)
+}
+
+/// Whether an element ends where its block is cut, and not at its end.
+fn is_cut(elements: &[Element], index: usize) -> bool {
+    let is_curved = |element: &Element| !matches!(element.shape, Shape::Line(_));
+    let element = &elements[index];
+    elements
+        .get(index + 1)
+        .is_some_and(|next| next.line == element.line && is_curved(element) && is_curved(next))
 }
 
 fn end_of(element: usize) -> PathPosition {
@@ -164,6 +178,25 @@ impl<'a> Laid<'a> {
         (first..behind)
             .map(|from| self.chord_mm(from, &point, element.exact_stop))
             .fold(f64::INFINITY, f64::min)
+    }
+
+    /// What is allowed where a block is cut: near one of its ends no less than is left of what is allowed there. Where the motion passes
+    /// the corner to a block of a wider tolerance as far off as it may, it is as far off the last of the narrower one.
+    fn limit_beside_corners_mm(&self, vertex: usize, options: &Options) -> f64 {
+        let mut limit_mm = limit_mm(self.elements, vertex, options);
+        if !is_cut(self.elements, vertex) {
+            return limit_mm;
+        }
+        let is_end = |index: &usize| !is_cut(self.elements, *index);
+        let corners = [
+            (vertex + 1..self.elements.len()).find(is_end),
+            (0..vertex).rev().find(is_end),
+        ];
+        for corner in corners.into_iter().flatten() {
+            let way_mm = (self.lengths_mm[corner + 1] - self.lengths_mm[vertex + 1]).abs();
+            limit_mm = limit_mm.max(self::limit_mm(self.elements, corner, options) - way_mm);
+        }
+        limit_mm
     }
 
     fn chord_mm(&self, from: usize, point: &Position, samples_only: bool) -> f64 {

@@ -386,6 +386,35 @@ fn samples_and_vertices_have_tolerances_of_their_own() {
     assert_passes(&judge(5.0, 0.21));
 }
 
+/// From an arc of 0.05 mm, which is judged where it is cut, back on a line of a wide tolerance: who cuts that corner off as far as the
+/// line allows leaves out the end of the arc.
+#[test]
+fn the_end_of_an_arc_may_be_left_out_as_far_as_the_corner_behind_it() {
+    const RADIUS: f64 = 0.05;
+    let on_arc = |degrees: f64| {
+        let angle = degrees.to_radians();
+        at(
+            1.0 + RADIUS * angle.sin(),
+            RADIUS - RADIUS * angle.cos(),
+            0.0,
+        )
+    };
+    let driven = |tolerance: &str, degrees: &[f64]| {
+        let program = format!(
+            "G64 P0.002\nG1 X1 F3000\nG3 X1.05 Y0.05 J0.05\nG64 P{tolerance}\nG1 Y-1\nM2\n"
+        );
+        let mut points = vec![at(0.0, 0.0, 0.0)];
+        points.extend(degrees.iter().map(|angle| on_arc(*angle)));
+        let last = points[points.len() - 1];
+        points.extend([at(1.0 + RADIUS, last[1], 0.0), at(1.0 + RADIUS, -1.0, 0.0)]);
+        verdict(&stop_at_all(&points, 50.0, 990.0), &program)
+    };
+    assert_passes(&driven("0.1", &[0.0, 15.0, 30.0, 45.0]));
+    // The corner is not the end of the tolerance of the arc: far before it that holds.
+    let far = driven("0.02", &[0.0, 15.0, 67.5, 75.0, 90.0]);
+    assert_finds(&far, &[Kind::PathDeviation, Kind::VertexMissed]);
+}
+
 /// An arc in XY around (0, 10) from the origin, counter-clockwise, rising along Z.
 fn arc(radius: f64, rise_per_rad: f64) -> impl Fn(f64) -> Position {
     let per_rad = radius.hypot(rise_per_rad);
