@@ -31,6 +31,11 @@ pub struct Beside<const L: usize> {
 }
 
 impl<const L: usize> Beside<L> {
+    /// The chord of the place on the path.
+    pub fn chord(&self) -> usize {
+        self.chord
+    }
+
     /// Path coordinate of the place on the path.
     pub fn path_coordinate(&self, run: &Run<'_, L>) -> f64 {
         let chord = &run.chords[self.chord];

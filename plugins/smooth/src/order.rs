@@ -9,7 +9,10 @@ use crate::route::{Chord, Run};
 
 /// How far a vertex may be from the samples between which it is passed, in tolerances: a place is the first that a sample may
 /// have, and lags behind it.
-const REACH: f64 = 4.0;
+pub const REACH: f64 = 4.0;
+
+/// What is as far as a chord is within that distance of it, whatever rounding says.
+const ROUNDED: f64 = 1.0 + 1e-9;
 
 /// Path coordinates of samples; keeps its memory.
 #[derive(Debug, Default)]
@@ -23,22 +26,44 @@ pub struct Order {
 impl Order {
     /// Finds the places of `samples` in a motion to `end` that follows the path: each within tolerance of the path, none before
     /// that of the sample before, from the start to the end; false where there are none. Samples before `begin` are those of another
-    /// window, which has looked at them; where it is left the path is near chord `near`.
+    /// window, which has looked at them; where it is left the path is near chord `near`. `nearness` says how much of the tolerance each of
+    /// the others may use; where it says nothing, or there are no places that near, all of it counts.
     #[inline(always)]
     pub fn walk<const L: usize>(
         &mut self,
         run: &Run<'_, L>,
-        samples: &[Lanes<L>],
+        (samples, nearness): (&[Lanes<L>], &[f64]),
         begin: usize,
         (near, end): (usize, f64),
     ) -> bool {
         let start = beside(run, near, &samples[begin]).path_coordinate(run);
         let tolerance = run.chords[run.chord_at(start, near)].tolerance;
-        let mut walker = Walker::begin(run, (start - 2.0 * tolerance).max(run.chords[0].s));
+        let start = (start - 2.0 * tolerance).max(run.chords[0].s);
+        let share = |n: usize| {
+            nearness
+                .get(n.wrapping_sub(begin))
+                .map_or(ALLOWED, |share| share * ROUNDED)
+        };
+        !nearness.is_empty() && self.places(run, samples, begin, (start, near, end), share)
+            || self.places(run, samples, begin, (start, near, end), |_| ALLOWED)
+    }
+
+    /// The same with the share of the tolerance that each sample may use, from the path coordinate `start` on.
+    #[inline(always)]
+    fn places<const L: usize>(
+        &mut self,
+        run: &Run<'_, L>,
+        samples: &[Lanes<L>],
+        begin: usize,
+        (start, near, end): (f64, usize, f64),
+        share: impl Fn(usize) -> f64,
+    ) -> bool {
+        let mut walker = Walker::begin(run, start);
         self.first.clear();
         self.last.clear();
         for n in begin..samples.len() {
-            if !walker.goes_on(&samples[n - usize::from(n > begin)], &samples[n]) {
+            let before = &samples[n - usize::from(n > begin)];
+            if !walker.goes_on(before, &samples[n], share(n)) {
                 return false;
             }
             self.first.push(walker.s());
@@ -48,7 +73,8 @@ impl Order {
             walker.is_near_all(run.chord_at(end, walker.chord), &samples[samples.len() - 1]);
         let mut walker = Walker::begin(run, end);
         for n in (0..samples.len()).rev() {
-            if walker.goes_back(&samples[(n + 1).min(samples.len() - 1)], &samples[n]) {
+            let behind = &samples[(n + 1).min(samples.len() - 1)];
+            if walker.goes_back(behind, &samples[n], share(n)) {
                 self.last.push(walker.s());
                 is_whole |= n == begin && walker.is_near_all(near, &samples[n]);
             } else if n >= begin {
@@ -100,15 +126,16 @@ impl<'a, const L: usize> Walker<'a, L> {
         self.chords[self.chord].s + self.along
     }
 
-    /// Goes on to the first place that is within tolerance of `sample`. Vertices on the way have to be near the way from the
+    /// Goes on to the first place that is within this share of the tolerance of `sample`. Vertices on the way have to be near the way from the
     /// sample before.
     #[inline(always)]
-    fn goes_on(&mut self, before: &Lanes<L>, sample: &Lanes<L>) -> bool {
+    fn goes_on(&mut self, before: &Lanes<L>, sample: &Lanes<L>, share: f64) -> bool {
         loop {
             if let Some([first, _]) = within(
                 &self.chords[self.chord],
                 [self.along, f64::INFINITY],
                 sample,
+                share,
             ) {
                 self.along = first;
                 return true;
@@ -124,9 +151,11 @@ impl<'a, const L: usize> Walker<'a, L> {
 
     /// Goes back to the last place that is within tolerance of `sample`, in the same way.
     #[inline(always)]
-    fn goes_back(&mut self, behind: &Lanes<L>, sample: &Lanes<L>) -> bool {
+    fn goes_back(&mut self, behind: &Lanes<L>, sample: &Lanes<L>, share: f64) -> bool {
         loop {
-            if let Some([_, last]) = within(&self.chords[self.chord], [0.0, self.along], sample) {
+            if let Some([_, last]) =
+                within(&self.chords[self.chord], [0.0, self.along], sample, share)
+            {
                 self.along = last;
                 return true;
             }
@@ -156,14 +185,15 @@ impl<'a, const L: usize> Walker<'a, L> {
     }
 }
 
-/// The first and the last place on `chord` between `low` and `high` that are within tolerance of `sample`.
+/// The first and the last place on `chord` between `low` and `high` that are within this share of the tolerance of `sample`.
 #[inline(always)]
 fn within<const L: usize>(
     chord: &Chord<L>,
     [low, high]: [f64; 2],
     sample: &Lanes<L>,
+    share: f64,
 ) -> Option<[f64; 2]> {
-    let most = ALLOWED * chord.tolerance;
+    let most = share * chord.tolerance;
     let way = minus(sample, &chord.start);
     let foot = dot(&way, &chord.direction);
     let across = minus(&way, &chord.direction.map(|d| foot * d));
@@ -217,7 +247,7 @@ pub(crate) mod tests {
     fn in_order(path: &[[f64; 2]], samples: &[[f64; 2]]) -> bool {
         let chords = lines(path);
         let run = open(&chords);
-        Order::default().walk(&run, samples, 0, (0, run.end()))
+        Order::default().walk(&run, (samples, &[]), 0, (0, run.end()))
     }
 
     #[test]
@@ -271,7 +301,7 @@ pub(crate) mod tests {
         // The window begins on the way back.
         let samples = [0.3, 0.5, 0.7, 0.9, 1.0, 0.9, 0.7, 0.5, 0.7, 2.0].map(|x| [x, 0.003]);
         let mut order = Order::default();
-        assert!(order.walk(&run, &samples, 6, (1, run.end())));
+        assert!(order.walk(&run, (&samples, &[]), 6, (1, run.end())));
         let tip = chords[2].s;
         assert_eq!(order.around(tip, &mut [0; 2]), (6, 7));
         // The corner before was passed by them.
@@ -279,7 +309,7 @@ pub(crate) mod tests {
         assert!(first <= 4 && last >= 4, "{first} to {last}");
         // What lies before the known path has no place on it.
         let far = [[-5.0, 0.0], [0.7, 0.003], [2.0, 0.0]];
-        assert!(order.walk(&run, &far, 1, (2, run.end())));
+        assert!(order.walk(&run, (&far, &[]), 1, (2, run.end())));
     }
 
     /// A vertex is passed between the last sample that is before it at all events, and the first that is behind it.
@@ -288,7 +318,7 @@ pub(crate) mod tests {
         let chords = lines(&[[0.0, 0.0], [10.0, 0.0]]);
         let samples: Vec<_> = (0..=10_u32).map(|n| [f64::from(n), 0.0]).collect();
         let mut order = Order::default();
-        assert!(order.walk(&open(&chords), &samples, 0, (0, 10.0)));
+        assert!(order.walk(&open(&chords), (&samples, &[]), 0, (0, 10.0)));
         let mut passed = [0; 2];
         for (s, among) in [(0.5, (0, 0)), (4.5, (4, 4)), (5.0, (4, 5)), (9.5, (9, 9))] {
             assert_eq!(order.around(s, &mut passed), among, "{s}");
@@ -309,7 +339,7 @@ pub(crate) mod tests {
                 chord.tolerance = tolerance;
             }
             let run = open(&chords);
-            let found = Order::default().walk(&run, &samples, 0, (0, run.end()));
+            let found = Order::default().walk(&run, (&samples, &[]), 0, (0, run.end()));
             assert_eq!(found, follows, "{tolerances:?}");
         }
     }

@@ -13,7 +13,7 @@ use crate::beside::{
 };
 use crate::feeds::Feeder;
 use crate::frame::{Frame, dot};
-use crate::order::Order;
+use crate::order::{Order, REACH};
 use crate::peaks::{bound, derivatives, highest, positions};
 use crate::plan::Start;
 use crate::route::Run;
@@ -64,6 +64,9 @@ pub struct Checker<const L: usize> {
     /// Bounds of the size of acceleration and jerk of every piece.
     bends: Vec<f64>,
     jerks: Vec<f64>,
+    /// Where the path comes close to itself: how near each sample of the window is to its place on it, as a share of the tolerance.
+    /// What lies between samples is left of it for those of another phase.
+    nearness: Vec<f64>,
     order: Order,
 }
 
@@ -73,6 +76,7 @@ impl<const L: usize> Default for Checker<L> {
             samples: Vec::new(),
             bends: Vec::new(),
             jerks: Vec::new(),
+            nearness: Vec::new(),
             order: Order::default(),
         }
     }
@@ -149,12 +153,14 @@ impl<const L: usize> Checker<L> {
         }
         self.sample(start, window, frame.period_s);
         let before = start.before.len();
-        checked.deviation = self.motion_off(run, window, frame.period_s, before);
+        let is_close = is_close(run, (start.s, window.end()));
+        checked.deviation = self.motion_off(run, window, frame.period_s, (before, is_close));
         if checked.deviation <= 1.0 {
             let near = run.chord_at(window.marks[0].s, 0);
+            let nearness = &self.nearness;
             if !self
                 .order
-                .walk(run, &self.samples, before, (near, window.end()))
+                .walk(run, (&self.samples, nearness), before, (near, window.end()))
             {
                 return Checked {
                     deviation: FAR,
@@ -186,20 +192,23 @@ impl<const L: usize> Checker<L> {
     }
 
     /// A bound of the distance of the motion from the path, as a share of what is allowed, at samples of any phase: what lies
-    /// between two of this one is looked at again where it matters.
+    /// between two of this one is looked at again where it matters. Where the path `is_close` to itself, how near each sample is to be
+    /// is noted.
     #[inline(always)]
     fn motion_off(
-        &self,
+        &mut self,
         run: &Run<'_, L>,
         window: &Window<L>,
         period_s: f64,
-        before: usize,
+        (before, is_close): (usize, bool),
     ) -> f64 {
         let mut worst = 0.0f64;
         let mut mark = 0;
         let mut piece = 0;
         let mut near = run.chord_at(window.marks[0].s, 0);
         let mut last: Option<Beside<L>> = None;
+        let mut left_before = ALLOWED;
+        self.nearness.clear();
         for (n, sample) in self.samples[before..].iter().enumerate() {
             let t = n as f64 * period_s;
             while mark + 2 < window.marks.len() && window.marks[mark + 1].t <= t {
@@ -211,6 +220,9 @@ impl<const L: usize> Checker<L> {
             near = run.chord_at(s, near);
             let here = beside(run, near, sample);
             let Some(last) = last.replace(here) else {
+                if is_close {
+                    self.nearness.push(ALLOWED * here.share);
+                }
                 worst = here.share;
                 continue;
             };
@@ -220,6 +232,12 @@ impl<const L: usize> Checker<L> {
                 bend = larger(bend, self.bends[piece]);
             }
             let bulge = bend * period_s * period_s / 8.0;
+            if is_close {
+                let left = ALLOWED - bulge / run.chords[here.chord()].tolerance;
+                self.nearness[n - 1] = larger(self.nearness[n - 1], left_before.min(left));
+                self.nearness.push(ALLOWED * here.share);
+                left_before = left;
+            }
             let mut between = stretch(run, &last, &here, bulge);
             if between > 1.0 {
                 let ends = [t - period_s, t.min(window.duration_s())];
@@ -346,6 +364,20 @@ impl<const L: usize> Checker<L> {
         best.sqrt()
     }
 }
+
+/// Whether the path turns, and turns again, within a few tolerances somewhere between two path coordinates: of two vertices that are so
+/// near each other a sample may be beside either.
+#[inline(always)]
+fn is_close<const L: usize>(run: &Run<'_, L>, (from, to): (f64, f64)) -> bool {
+    let chords = &run.chords[run.chord_at(from, 0)..];
+    chords
+        .iter()
+        .take_while(|chord| chord.s < to)
+        .any(|chord| chord.length < REACH * chord.tolerance && chord.turn > TURNS)
+}
+
+/// A turn by more than this is one by which the path may come close to itself.
+const TURNS: f64 = 0.1;
 
 /// Way before the start in which vertices are looked at again: the samples behind the start are new.
 const AROUND: f64 = 0.05;
