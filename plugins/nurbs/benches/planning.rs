@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use common::measure::BEST_S;
 use common::{canonical, context, curve_block};
 use tandem_nurbs::{NurbsPlanner, Options};
-use tandem_rig::{Given, Offer};
+use tandem_rig::{Given, Offer, processor_time};
 use tandem_sdk::{AxisVector, BlockReport, Planner, Segment, SegmentSink};
 
 /// Batches of which the fastest counts, and runs in one.
@@ -44,17 +44,6 @@ fn main() {
             );
         }
     }
-}
-
-/// Processor time of this thread.
-fn processor_time() -> Duration {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat")
-        .expect("Linux tells the time of a thread");
-    let running = text
-        .split_whitespace()
-        .next()
-        .and_then(|number| number.parse().ok());
-    Duration::from_nanos(running.expect("a number"))
 }
 
 /// Adds up the time of what comes.

@@ -41,11 +41,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             continue;
         }
         let mut results = vec![];
+        let mut speeds = vec![];
         let mut seed = arguments.seed;
         while results.len() < arguments.count as usize
             && seed < arguments.seed + 3 * arguments.count
         {
             if let Some(result) = row.run(seed, folder.path()) {
+                let speed = row.speed(seed, folder.path());
                 if arguments.each {
                     println!(
                         "{} {:9} {:8.3} s, best {:8.3}, ratio {:.4}, {:5.0} × real time, {}",
@@ -54,17 +56,17 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                         result.time_s,
                         result.best_s,
                         result.time_s / result.best_s,
-                        result.speed,
+                        speed,
                         result.verdict
                     );
                 }
+                speeds.push(speed);
                 results.push(result);
             }
             seed += 1;
         }
         results.sort_by(|a, b| (a.time_s / a.best_s).total_cmp(&(b.time_s / b.best_s)));
         let ratios: Vec<f64> = results.iter().map(|r| r.time_s / r.best_s).collect();
-        let mut speeds: Vec<f64> = results.iter().map(|r| r.speed).collect();
         speeds.sort_by(f64::total_cmp);
         let clean = results.iter().filter(|r| r.verdict == "clean").count();
         println!(

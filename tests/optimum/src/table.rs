@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::draw::{Paths, kind, program};
-use crate::trial::{Mill, best_along_curve, driven};
+use crate::trial::{Mill, best_along_curve, driven, planning_speed};
 
 /// What a time is compared with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,8 +102,6 @@ pub struct Result {
     pub time_s: f64,
     /// The shortest known, s.
     pub best_s: f64,
-    /// Time of motion by time of planning.
-    pub speed: f64,
     /// `clean`, or what the judge says.
     pub verdict: String,
 }
@@ -127,9 +125,15 @@ impl Row {
             },
             time_s: done.time_s,
             best_s,
-            speed: done.speed,
             verdict: done.verdict,
         })
+    }
+
+    /// Time of motion by processor time of planning the program of `seed` by itself; not a number where it is not driven.
+    pub fn speed(&self, seed: u64, folder: &Path) -> f64 {
+        let done = driven(&program(self.paths, seed), &self.mill, folder);
+        let speed = (done.verdict == "clean").then(|| planning_speed(&folder.join("program.ngc")));
+        speed.flatten().unwrap_or(f64::NAN)
     }
 
     fn settings(&self, text: &str, folder: &Path) -> f64 {

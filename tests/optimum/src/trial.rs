@@ -1,14 +1,15 @@
 //! One program on one machine: its time as it was driven, and the shortest.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use tandem_campaign::case::{Case, MachineText};
 use tandem_campaign::run::{Ran, drive, registry};
 use tandem_campaign::verdict::judge;
-use tandem_host::{Switches, each_block};
+use tandem_host::{Switches, each_block, planner};
 use tandem_machine::Machine;
 use tandem_oracle::Row;
-use tandem_sdk::NurbsData;
+use tandem_rig::{Away, Given, processor_time, stream};
 
 use crate::best::best;
 use crate::course::{Course, Limits};
@@ -75,11 +76,12 @@ impl Mill {
 pub struct Driven {
     /// From the first sample that moves to the last, s; not a number where it was not driven.
     pub time_s: f64,
-    /// Time of motion by time of planning.
-    pub speed: f64,
     /// `clean`, or what the judge says.
     pub verdict: String,
 }
+
+/// Processor time for which a program is planned again and again, s: the system counts it in steps of milliseconds.
+const PLANNED_S: f64 = 0.1;
 
 /// Drives `program` on `mill` and has it judged. Its files are left in `folder`.
 pub fn driven(program: &str, mill: &Mill, folder: &Path) -> Driven {
@@ -93,31 +95,52 @@ pub fn driven(program: &str, mill: &Mill, folder: &Path) -> Driven {
         Err(report) => {
             return Driven {
                 time_s: f64::NAN,
-                speed: f64::NAN,
                 verdict: format!("{}: {}", report.kind, report.why),
             };
         }
     };
     let report = judge(&run.ran, &case, &run.judging, &run.asked);
     let time_s = moving_s(&run.ran, mill.period_ms / 1000.0);
-    let planned_s = run.ran.outcome.as_ref().map_or(f64::NAN, |outcome| {
-        let rows = &outcome.summary.planning_us.histogram;
-        let middle = |from: f64, to: f64| f64::midpoint(from, to);
-        let sum: f64 = rows
-            .iter()
-            .map(|row| row.periods as f64 * middle(row.from_us, row.below_us))
-            .sum();
-        1e-6 * sum
-    });
     Driven {
         time_s,
-        speed: time_s / planned_s,
         verdict: if report.is_failure() {
             format!("{}: {}", report.kind, report.why)
         } else {
             report.kind
         },
     }
+}
+
+/// The blocks of `program`, which stands beside its machine file.
+fn blocks(program: &Path) -> Option<(Machine, Vec<Given>)> {
+    let machine = Machine::read(&program.with_file_name("machine.toml"), &[]).ok()?;
+    let mut parsed = tandem_gcode::Program::open(program).ok()?;
+    let mut blocks = vec![];
+    each_block(
+        &machine,
+        &mut parsed,
+        Switches::default(),
+        &mut |block, curve| blocks.push((*block, curve.map(|curve| Arc::new(curve.to_data())))),
+    )
+    .ok()?;
+    Some((machine, blocks))
+}
+
+/// Time of motion by processor time of planning `program` by itself, streaming, from its blocks to the last segment. The program has
+/// been driven, and was clean.
+pub fn planning_speed(program: &Path) -> Option<f64> {
+    let (machine, blocks) = blocks(program)?;
+    let registry = registry();
+    let (mut motion_s, mut planning_s) = (0.0, 0.0);
+    while planning_s < PLANNED_S {
+        let mut planner = planner(&machine, &registry).ok()?;
+        let mut away = Away::default();
+        let started = processor_time();
+        stream(planner.as_mut(), &blocks, machine.rough_period_s, &mut away);
+        planning_s += (processor_time() - started).as_secs_f64();
+        motion_s += away.duration_s;
+    }
+    Some(motion_s / planning_s)
 }
 
 fn moving_s(ran: &Ran, period_s: f64) -> f64 {
@@ -133,31 +156,17 @@ fn moving_s(ran: &Ran, period_s: f64) -> f64 {
 /// The shortest time along the one curve of `program`, s; none where that is not what it has, or where no motion was found
 /// whose samples keep the limits.
 pub fn best_along_curve(program: &Path, mill: &Mill, chord: bool) -> Option<f64> {
-    let machine = Machine::read(&program.with_file_name("machine.toml"), &[]).ok()?;
-    let mut parsed = tandem_gcode::Program::open(program).ok()?;
-    let mut curves: Vec<(NurbsData, f64)> = vec![];
-    let mut others = 0;
-    each_block(
-        &machine,
-        &mut parsed,
-        Switches::default(),
-        &mut |block, curve| match curve {
-            Some(curve) => curves.push((curve.to_data(), block.feed_mm_per_s)),
-            None if block.length_mm > 0.0 => others += 1,
-            None => {}
-        },
-    )
-    .ok()?;
-    let [(data, feed_mm_per_s)] = curves.as_slice() else {
+    let (machine, blocks) = blocks(program)?;
+    let moving = blocks
+        .iter()
+        .filter(|(block, curve)| curve.is_some() || block.length_mm > 0.0);
+    let [(block, Some(data))] = moving.collect::<Vec<_>>()[..] else {
         return None;
     };
-    if others > 0 {
-        return None;
-    }
     let course = Course::new(data, &machine.axes).ok()?;
     let lanes = machine.axes.count();
     let limits = Limits {
-        feed_mm_per_s: *feed_mm_per_s,
+        feed_mm_per_s: block.feed_mm_per_s,
         speed_mm_per_s: vec![SPEED; lanes],
         acceleration_mm_per_s2: vec![mill.acceleration; lanes],
         jerk_mm_per_s3: vec![mill.jerk; lanes],

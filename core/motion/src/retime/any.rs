@@ -12,8 +12,9 @@ const GROUPS: usize = PLACES + 2;
 /// Axes of the smaller of both forms: four numbers fill a wide register.
 const FEW: usize = 4;
 
-/// What is asked of every solution: its rows are kept within two thousandths, its time is within about 1e-4 of the least.
-const ASKED: Asked = Asked {
+/// What is asked of a solution where nothing else is said: its rows are kept within two thousandths, its time is within about 1e-4 of
+/// the least.
+pub const ASKED: Asked = Asked {
     gap: 1e-4,
     violation: 2e-3,
     iterations: 40,
@@ -31,6 +32,9 @@ pub struct Between {
     /// The motion there.
     pub points: [Point<MAX_AXES>; PLACES],
 }
+
+/// Share of a limit that is next to none: an axis that takes less of all of its limits at a rate of 1 keeps them at any.
+const NONE: f64 = 1e-5;
 
 /// What each axis may do.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,19 +74,25 @@ pub struct AnyRetimer {
 impl AnyRetimer {
     /// Finds the rate for `task`. Rough loop; allocates where the grid is larger than any before.
     pub fn solve(&mut self, task: &Task) -> Status {
-        self.solve_from(task, false)
+        self.solve_to(task, &ASKED)
     }
 
-    /// The same, from the present [`AnyRetimer::rate`]: that of points which were about the same, on the same grid.
+    /// The same, as near as is asked for.
+    pub fn solve_to(&mut self, task: &Task, asked: &Asked) -> Status {
+        self.solve_from(task, asked, false)
+    }
+
+    /// The same as [`AnyRetimer::solve`], from the present [`AnyRetimer::rate`]: that of points which were about the same, on the same
+    /// grid.
     pub fn solve_again(&mut self, task: &Task) -> Status {
-        self.solve_from(task, true)
+        self.solve_from(task, &ASKED, true)
     }
 
-    fn solve_from(&mut self, task: &Task, again: bool) -> Status {
+    fn solve_from(&mut self, task: &Task, asked: &Asked, again: bool) -> Status {
         if task.limits.count <= FEW {
-            solve(&mut self.few, &mut self.rate, task, again)
+            solve(&mut self.few, &mut self.rate, task, asked, again)
         } else {
-            solve(&mut self.all, &mut self.rate, task, again)
+            solve(&mut self.all, &mut self.rate, task, asked, again)
         }
     }
 }
@@ -91,6 +101,7 @@ fn solve<const L: usize>(
     retimer: &mut Retimer<L, GROUPS>,
     rate: &mut Rate,
     task: &Task,
+    asked: &Asked,
     again: bool,
 ) -> Status {
     let limits = &task.limits;
@@ -105,7 +116,8 @@ fn solve<const L: usize>(
         per_acceleration: each(|l| per(&limits.acceleration_mm_per_s2, l)),
         per_jerk: each(|l| per(&limits.jerk_mm_per_s3, l)),
     };
-    retimer.begin(task.step_s, &std::array::from_fn(|l| l < task.limits.count));
+    let moving = std::array::from_fn(|l| l < limits.count && task.moves(l));
+    retimer.begin(task.step_s, &moving);
     for points in task.points {
         retimer.push(&points.each_ref().map(narrow), &factors);
     }
@@ -115,12 +127,29 @@ fn solve<const L: usize>(
     }
     std::mem::swap(rate, &mut retimer.rate);
     let status = if again {
-        retimer.solve_again(task.ends, &ASKED)
+        retimer.solve_again(task.ends, asked)
     } else {
-        retimer.solve(task.ends, &ASKED)
+        retimer.solve(task.ends, asked)
     };
     std::mem::swap(rate, &mut retimer.rate);
     status
+}
+
+impl Task<'_> {
+    /// Whether an axis moves so much that its rows count.
+    fn moves(&self, l: usize) -> bool {
+        let acceleration = NONE * self.limits.acceleration_mm_per_s2[l];
+        let jerk = NONE * self.limits.jerk_mm_per_s3[l];
+        let speed = (acceleration * self.step_s).min(jerk * self.step_s * self.step_s);
+        let rests = |point: &Point<MAX_AXES>| {
+            speed.is_finite()
+                && point.first[l].abs() <= speed
+                && point.second[l].abs() <= acceleration
+                && point.third[l].abs() <= jerk
+        };
+        let between = self.between.iter().map(|more| &more.points);
+        !self.points.iter().chain(between).flatten().all(rests)
+    }
 }
 
 /// The point of the first axes.

@@ -36,7 +36,7 @@ mod retimer;
 mod share;
 mod timing;
 
-pub use any::{AnyRetimer, AxisLimits, Between, Task};
+pub use any::{ASKED, AnyRetimer, AxisLimits, Between, Task};
 pub use retimer::{Asked, Factors, Retimer, Status};
 pub use timing::{Rate, weights};
 

@@ -84,6 +84,15 @@ fn a_tight_turn_uses_the_jerk_that_there_is() {
     );
 }
 
+/// Rows of an axis at rest would be kept by any rate, and cost as much as others.
+#[test]
+fn an_axis_that_rests_is_no_part_of_what_is_solved() {
+    let done = |count| retimed(&line(50.0), &limits(count), 1e-3, 1);
+    let (alone, among) = (done(1), done(3));
+    assert_eq!(alone.status, among.status);
+    assert_eq!(alone.time_s.to_bits(), among.time_s.to_bits());
+}
+
 /// What is asked for between the places of the grid is kept there, and changes nothing far from it.
 #[test]
 fn places_between_those_of_the_grid_count() {

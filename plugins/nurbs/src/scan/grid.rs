@@ -22,8 +22,8 @@ const SLOWER: f64 = 0.85;
 
 /// Share of an axis's acceleration that turning may take: the rows of the grid see to the rest.
 const TURNING: f64 = 0.95;
-/// How much faster than the first timing a knot may be passed, for what is left of the jerk there.
-const FASTER: f64 = 1.4;
+/// How far around a knot its step of acceleration shows beside the jerk in samples, in fine periods.
+const SHOWN_PERIODS: f64 = 0.75;
 
 /// Intervals at the start of a window in motion with a little more of rate squared, acceleration and jerk.
 const YIELDING: usize = 3;
@@ -43,6 +43,17 @@ struct PlaceBounds {
     yields: bool,
 }
 
+/// A knot, whose step of acceleration takes its part of the jerk that samples show around it.
+#[derive(Clone, Copy, Debug)]
+struct Knot {
+    interval: usize,
+    s_mm: f64,
+    /// How far it shows, mm.
+    shown_mm: f64,
+    /// Share of the jerk that it leaves.
+    left: f64,
+}
+
 /// The places; keeps its memory.
 #[derive(Debug, Default)]
 pub struct Grid {
@@ -50,18 +61,23 @@ pub struct Grid {
     pub between: Vec<Between>,
     places: Vec<[PlaceBounds; PLACES]>,
     more: Vec<[PlaceBounds; PLACES]>,
+    knots: Vec<Knot>,
+    /// How much faster than the motion a knot may be passed, for what is left of the jerk there.
+    faster: f64,
 }
 
 impl Grid {
-    /// Lays the grid of `intervals` along `motion`.
+    /// Lays the grid of `intervals` along `motion`, whose speed is to become up to `faster` times as high at knots.
     pub fn lay(
         &mut self,
         route: &Route,
         bounds: &Bounds,
         motion: &Rated,
-        intervals: usize,
+        (intervals, faster): (usize, f64),
         slowdowns: &Slowdowns,
     ) {
+        self.faster = faster;
+        self.knots.clear();
         self.points.clear();
         self.between.clear();
         self.places.clear();
@@ -102,6 +118,7 @@ impl Grid {
                 (k, [states[0][0], states[2][0]]),
             );
         }
+        self.leave_around_knots();
     }
 
     /// Further places of an interval: around `z`.
@@ -187,18 +204,52 @@ impl Grid {
             let laid =
                 laid.map(|(state, at, cap)| place(leg, bounds, slowdowns, (&state, cap), &at));
             let mut laid = laid;
-            // The step of acceleration takes its part of the jerk that samples show around the knot.
-            let left = Leg::jerk_left_at_step(&sides, FASTER * state[1], step_cap, bounds);
+            let left = Leg::jerk_left_at_step(&sides, self.faster * state[1], step_cap, bounds);
             for (point, place) in &mut laid[..2] {
                 place.jerk = left;
                 point.jerk_share *= left;
             }
+            self.knots.push(Knot {
+                interval,
+                s_mm: knot_mm,
+                shown_mm: SHOWN_PERIODS * bounds.context.fine_period_s * state[1],
+                left,
+            });
             self.between.push(Between {
                 interval,
                 z,
                 points: laid.map(|(point, _)| point),
             });
             self.more.push(laid.map(|(_, place)| place));
+        }
+    }
+
+    /// Leaves no more of the jerk right beside a knot than at it: samples see both.
+    fn leave_around_knots(&mut self) {
+        let mut first_between = 0;
+        for knot in self.knots.iter().filter(|knot| knot.left < 1.0) {
+            let around = knot.interval.saturating_sub(1)..knot.interval + 2;
+            let inside = around.start..around.end.min(self.points.len());
+            let skipped = self.between[first_between..]
+                .iter()
+                .take_while(|more| more.interval < around.start);
+            first_between += skipped.count();
+            let between = self.between[first_between..]
+                .iter_mut()
+                .take_while(|more| around.contains(&more.interval))
+                .map(|more| &mut more.points)
+                .zip(&mut self.more[first_between..]);
+            let all = self.points[inside.clone()]
+                .iter_mut()
+                .zip(&mut self.places[inside])
+                .chain(between)
+                .flat_map(|(points, places)| points.iter_mut().zip(places));
+            for (point, place) in all {
+                if (place.s_mm - knot.s_mm).abs() <= knot.shown_mm && knot.left < place.jerk {
+                    point.jerk_share *= knot.left / place.jerk;
+                    place.jerk = knot.left;
+                }
+            }
         }
     }
 

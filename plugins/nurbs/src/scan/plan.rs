@@ -1,6 +1,6 @@
 //! Planning one window.
 
-use tandem_motion::retime::{AnyRetimer, AxisLimits, End, Task};
+use tandem_motion::retime::{ASKED, AnyRetimer, Asked, AxisLimits, End, Task};
 use tandem_sdk::MAX_AXES;
 
 use super::first::First;
@@ -24,10 +24,23 @@ const COARSER: f64 = 0.6;
 /// How often what was found is followed at most, and the share of its time that it has to come to for another time.
 const FOLLOWED: usize = 4;
 const FASTER: f64 = 0.98;
+/// How near to the least time what is only followed comes, and in how many iterations: where no rate keeps the limits on the way to
+/// it, one is sought along what was found. And how near what is followed again.
+const ROUGHLY: Asked = Asked {
+    gap: 1e-3,
+    iterations: 12,
+    ..ASKED
+};
+const FOLLOWING: Asked = Asked { gap: 3e-4, ..ASKED };
+/// How much faster than a first timing a knot may be passed, and than a motion that was found.
+const FASTER_AT_KNOT: f64 = 1.2;
+const FOUND_FASTER_AT_KNOT: f64 = 1.1;
 /// Tries.
 const TRIES: usize = 10;
 /// Tries after which limits of samples are to be kept, or never will.
 const HOPELESS: usize = 8;
+/// Violation of a row, whose right side is 1 at a rate of 1, of which two tries of a window in motion come to nothing.
+const LOST: f64 = 0.1;
 /// A solution so short, or that takes more than this share of the ramps it began with, is compared with ramps that keep
 /// every limit.
 const SHORT_S: f64 = 0.15;
@@ -71,6 +84,23 @@ impl From {
         match self {
             Self::FirstTiming | Self::Roughly => JERK_SHARE,
             Self::Found => FOUND_JERK_SHARE,
+        }
+    }
+
+    /// How much faster a knot may be passed.
+    fn faster_at_knot(self) -> f64 {
+        match self {
+            Self::FirstTiming | Self::Roughly => FASTER_AT_KNOT,
+            Self::Found => FOUND_FASTER_AT_KNOT,
+        }
+    }
+
+    /// What is asked of a solution that does not go on from another one.
+    fn asked(self) -> Asked {
+        match self {
+            Self::FirstTiming => ASKED,
+            Self::Roughly => ROUGHLY,
+            Self::Found => FOLLOWING,
         }
     }
 
@@ -129,27 +159,27 @@ impl Scan {
         self.keeps(job, window, From::Found)
     }
 
-    /// The rate along the motion of `window`, and along what comes of that, as long as it becomes much faster.
-    fn follow(&mut self, job: &Job<Driven>, window: &mut Window<Driven>) {
+    /// The rate along the motion of `window`, and along what comes of that, as long as it becomes much faster. Gives by how much
+    /// the last one violates a row.
+    fn follow(&mut self, job: &Job<Driven>, window: &mut Window<Driven>) -> f64 {
+        let mut over = 0.0;
         for _ in 0..FOLLOWED {
             std::mem::swap(window, &mut self.found);
             self.follow_found(job, window);
-            // In its own time the rate is about 1.
-            let rate = &mut window.motion.rated.rate.coefficients;
-            rate.clear();
-            rate.resize(self.grid.points.len() + 2, 1.0);
-            self.solve(job, (From::Found, true), window);
+            over = self.solve(job, (From::Found, false), window);
             let duration_s = window.duration_s();
             if !duration_s.is_finite() || duration_s > FASTER * self.found.duration_s() {
                 break;
             }
         }
+        over
     }
 
     /// Tries rates until limits are kept, one that begins at a motion and others that take something back; false where none does.
     fn keeps(&mut self, job: &Job<Driven>, window: &mut Window<Driven>, from: From) -> bool {
         // The last try whose samples keep the limits, where single points do not.
         let mut kept = None;
+        let mut over_before = 0.0;
         for n in 1..=TRIES {
             let known = self.slowdowns.count();
             let again = n > 1 && self.grid.ease(&self.slowdowns);
@@ -162,15 +192,18 @@ impl Scan {
                     From::Found => self.follow_found(job, window),
                 }
             }
-            if n == 1 && from == From::Found {
-                self.follow(job, window);
+            let over = if n == 1 && from == From::Found {
+                self.follow(job, window)
             } else {
-                self.solve(job, (from, again), window);
-            }
+                self.solve(job, (from, again), window)
+            };
             if n == 1 && from == From::FirstTiming {
                 self.begun_s = self.first.end().0;
             }
-            if self.crawls(job, window) {
+            // The window before is driven on, and the next one begins where it is easier.
+            let is_lost = !job.rests() && over.min(over_before) > LOST;
+            over_before = over;
+            if is_lost || self.crawls(job, window) {
                 break;
             }
             let kept_all = !self.dips(job, window)
@@ -264,13 +297,13 @@ impl Scan {
         found
     }
 
-    /// A rate on the motion there is, from the rate before where that was about the same.
+    /// A rate on the motion there is, from the rate before where that was about the same. Gives by how much it violates a row.
     fn solve(
         &mut self,
         job: &Job<Driven>,
         (from, again): (From, bool),
         window: &mut Window<Driven>,
-    ) {
+    ) -> f64 {
         window.motion.by_ramps = false;
         let motion = &mut window.motion.rated;
         let begin = if job.rests() { End::Rest } else { End::Moving };
@@ -281,12 +314,12 @@ impl Scan {
             step_s: motion.step_s,
             ends: (begin, End::Rest),
         };
-        if again {
+        let status = if again {
             std::mem::swap(&mut motion.rate, &mut self.retimer.rate);
-            self.retimer.solve_again(&task);
+            self.retimer.solve_again(&task)
         } else {
-            self.retimer.solve(&task);
-        }
+            self.retimer.solve_to(&task, &from.asked())
+        };
         std::mem::swap(&mut motion.rate, &mut self.retimer.rate);
         let rate = &motion.rate;
         let step_s = motion.step_s;
@@ -294,6 +327,7 @@ impl Scan {
             &mut window.times,
             (0..rate.intervals()).map(|k| rate.time_s(k, 1.0, step_s)),
         );
+        status.violation
     }
 
     /// The motion in pseudo-time; gives whether it goes to the end.
@@ -337,8 +371,14 @@ impl Scan {
     }
 
     fn lay(&mut self, job: &Job<Driven>, motion: &Rated, intervals: usize, from: From) {
-        self.grid
-            .lay(job.route, job.bounds, motion, intervals, &self.slowdowns);
+        let faster = from.faster_at_knot();
+        self.grid.lay(
+            job.route,
+            job.bounds,
+            motion,
+            (intervals, faster),
+            &self.slowdowns,
+        );
         if !job.rests() {
             self.grid.yield_at_start(from.finer().ceil() as usize);
         }
