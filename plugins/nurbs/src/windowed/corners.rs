@@ -225,8 +225,10 @@ pub struct Limit<'a> {
     at: usize,
 }
 
-/// A limit that rises by this much from one place to the next steps there: a block of a higher feed begins. Along a curve places stand so
-/// close that it rises by less, and a ramp that is compared at each of them is another one at nearly every curve.
+/// A limit that rises by this factor from one place to the next steps there: a block of a higher feed begins. Along a curve places stand so
+/// close that it rises by less, and a ramp that is compared at each of them is another one at nearly every curve. With half of the rise one
+/// place in fifty of a curve steps, and with twice as much a block of a seventh more feed does not
+/// (`a_higher_feed_is_a_step_of_the_limit_and_a_curve_hardly_ever_is`).
 const STEP: f64 = 1.1;
 
 impl<'a> Limit<'a> {

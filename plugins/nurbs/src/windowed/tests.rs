@@ -320,3 +320,28 @@ fn no_ramp_rises_before_the_end_of_a_block_of_a_lower_feed() {
     close(speed, LOW, 1e-3, 0.0);
     assert!(plan.iter().any(|ramp| ramp.speed[0] > 100.0 * LOW));
 }
+
+/// Hardly a place of a curve counts as one where a block of a higher feed begins; the end of a block whose feed is a seventh
+/// lower does.
+#[test]
+fn a_higher_feed_is_a_step_of_the_limit_and_a_curve_hardly_ever_is() {
+    for name in ["butterfly", "trident", "infinity"] {
+        let (curve, table) = canonical(name);
+        let places = survey(&curve, &table).places;
+        let steps = Limit::new(&places).between(0.0, f64::INFINITY).count();
+        assert!(
+            100 * steps <= places.len(),
+            "{name}: {steps} of {}",
+            places.len()
+        );
+    }
+    let places: Vec<Corner> = (0..10)
+        .map(|n| Corner {
+            at_mm: f64::from(n),
+            speed_mm_per_s: if n > 5 { 80.0 } else { 70.0 },
+        })
+        .collect();
+    let limit = Limit::new(&places);
+    let steps: Vec<f64> = limit.between(0.0, 9.0).map(|place| place.at_mm).collect();
+    assert_eq!(steps, [5.0]);
+}
