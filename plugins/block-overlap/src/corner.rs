@@ -340,7 +340,8 @@ mod tests {
         assert_eq!(cap_mm_per_s(2e-3, 0.0, 0.1, 0.0), 0.0);
     }
 
-    /// At the lifted feed turning with the slower block's and the change to it take what arcs leave of the acceleration.
+    /// At the lifted feed turning with the slower block's and the change to it take what arcs leave of the acceleration, in the overlap
+    /// of the time constant and in one that the room shortens.
     #[test]
     fn a_lifted_feed_takes_all_of_the_overlap() {
         let corner = Corner {
@@ -351,16 +352,22 @@ mod tests {
             spare: 0.7,
             ..Corner::default()
         };
-        for slow in [5.0, 30.0, 45.0] {
-            for slope in [1e-3, 3e-3] {
-                let fast = corner.lift_mm_per_s(slow, slope);
-                let overlap_s = f64::min(corner.longest_s, corner.room_mm / fast);
-                let taken_s = slow * corner.turn_s2_per_mm + (fast - slow) * slope;
-                assert!(
-                    (taken_s / (corner.spare * overlap_s) - 1.0).abs() < 1e-9,
-                    "{slow} {slope}"
-                );
-            }
+        for (slow, slope, room_mm) in [
+            (5.0, 1e-3, 2.0),
+            (30.0, 3e-3, 2.0),
+            (45.0, 1e-3, 2.0),
+            (5.0, 1e-3, 0.2),
+            (15.0, 3e-3, 0.5),
+        ] {
+            let corner = Corner { room_mm, ..corner };
+            let fast = corner.lift_mm_per_s(slow, slope);
+            let overlap_s = f64::min(corner.longest_s, room_mm / fast);
+            let taken_s = slow * corner.turn_s2_per_mm + (fast - slow) * slope;
+            assert!(fast > slow);
+            assert!(
+                (taken_s / (corner.spare * overlap_s) - 1.0).abs() < 1e-9,
+                "{slow} {room_mm}"
+            );
         }
         let capped = Corner {
             cap_mm_per_s: 20.0,
@@ -370,5 +377,42 @@ mod tests {
         assert_eq!(corner.lift_mm_per_s(5.0, 0.0), 1000.0);
         // A slower block that takes more than there is lifts nothing.
         assert_eq!(corner.lift_mm_per_s(200.0, 1e-3), 200.0);
+    }
+
+    /// A line that runs into an arc: turning on it, half as much again while they overlap, bounds the feed at which they do, and what it
+    /// takes is not there for a change of feed.
+    #[test]
+    fn an_arc_takes_its_part_of_an_overlap() {
+        let line = Entry {
+            feed_mm_per_s: 200.0,
+            length_mm: 100.0,
+            tau_s: 0.02,
+            tolerance_mm: 100.0,
+            rests: [false; 2],
+            ..Entry::blank()
+        };
+        let arc = Entry {
+            bend: 1e-4,
+            ..line.clone()
+        };
+        for [before, after] in [[&line, &arc], [&arc, &line]] {
+            let corner = Corner::new(&rules(), before, after);
+            let cap = (TURN_SHARE / (1.5 * 1e-4)).sqrt();
+            assert!((corner.cap_mm_per_s / cap - 1.0).abs() < 1e-9);
+            assert!((corner.spare - (1.0 - TURN_SHARE)).abs() < 1e-9);
+            let slow = Entry {
+                feed_mm_per_s: 40.0,
+                ..before.clone()
+            };
+            let slower = Entry {
+                feed_mm_per_s: 30.0,
+                ..after.clone()
+            };
+            let spare = Corner::new(&rules(), &slow, &slower).spare;
+            assert!(
+                (spare - (1.0 - 1.5 * 1e-4 * 1600.0)).abs() < 1e-9,
+                "{spare}"
+            );
+        }
     }
 }

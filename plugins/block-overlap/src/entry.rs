@@ -249,3 +249,57 @@ impl Entry {
         self.rests[1] || next.rests[0] || self.turns_only != next.turns_only
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::options::Options;
+    use std::sync::OnceLock;
+    use tandem_sdk::{JointLanes, Limits, PlannerContext};
+
+    /// X and Y with 1000 mm/s², and a joint that is three quarters of the sum of both, with 400 mm/s².
+    fn rules() -> Rules {
+        static LANES: OnceLock<JointLanes> = OnceLock::new();
+        let weights = AxisVector::from_slice(&[0.75, 0.75]);
+        let lanes = LANES.get_or_init(|| JointLanes::new(2, &[weights]).unwrap());
+        let limits = [1000.0, 1000.0, 400.0].map(tandem_rig::axis);
+        let context = PlannerContext {
+            limits: Limits::new(&limits).unwrap(),
+            joint_lanes: Some(lanes),
+            ..tandem_rig::context(&limits[..2], 0.001)
+        };
+        Rules::new(&Options::default(), &context)
+    }
+
+    /// On a circle the sum sways by the length of its weights: that is what turning and speeding up have least of.
+    #[test]
+    fn an_arc_has_what_its_weakest_axis_or_joint_has_of_the_whole_circle() {
+        let rules = rules();
+        let weak = 0.75 * 2f64.sqrt() / (0.999 * 400.0);
+        for (radius_mm, feed, expected) in [
+            (5.0, 10.0, LimitedBy::Feed),
+            (5.0, 100.0, LimitedBy::Curvature),
+            (20.0, 100.0, LimitedBy::Curvature),
+        ] {
+            let from = AxisVector::from_slice(&[radius_mm, 0.0]);
+            let block = tandem_rig::arc(&from, [0.0, 0.0], 1.0, feed);
+            let mut entry = Entry::blank();
+            entry.set(&block, &rules, [0.02; 2]);
+            assert!((entry.length_mm - radius_mm).abs() < 1e-9);
+            assert!((entry.curvature_per_mm * radius_mm - 1.0).abs() < 1e-9);
+            assert!(
+                (entry.bend * radius_mm / weak - 1.0).abs() < 1e-9,
+                "{}",
+                entry.bend
+            );
+            assert!((entry.slope_s2_per_mm * ARC_SHARE / weak - 1.0).abs() < 1e-9);
+            let turning = (TURN_SHARE * radius_mm / weak).sqrt();
+            assert!((entry.feed_mm_per_s / feed.min(turning) - 1.0).abs() < 1e-9);
+            assert_eq!(entry.reason, expected, "{radius_mm} {feed}");
+            // From rest to rest with that acceleration over its length.
+            let triangle = (radius_mm / entry.slope_s2_per_mm).sqrt();
+            assert!((entry.triangle_mm_per_s / triangle - 1.0).abs() < 1e-12);
+            assert!((entry.reach_mm - 0.02 * entry.feed_mm_per_s).abs() < 1e-12);
+        }
+    }
+}

@@ -541,4 +541,59 @@ mod tests {
         println!("worst {worst:.4}, mean {mean:.5} of the fastest");
         assert!(worst < 1.01 && mean < 1.0002);
     }
+
+    /// Three blocks in a line, at 6000 mm/min.
+    fn line(rules: &Rules) -> Buffer {
+        let points = [0.0, 5.0, 10.0, 15.0].map(|x| AxisVector::from_slice(&[x, 0.0]));
+        let mut buffer = Buffer::new(8, 0.02);
+        for block in lines(&points, |_| 6000.0) {
+            buffer.push(rules, |entry| entry.set(&block, rules, [0.02; 2]));
+        }
+        buffer
+    }
+
+    #[test]
+    fn a_block_may_be_lowered_where_the_one_before_can_still_hand_over() {
+        let rules = Rules::new(&Options::default(), &context(&[axis(1000.0); 2], 0.001));
+        let buffer = line(&rules);
+        let ring = buffer.ring();
+        let mut plan = Plan::new(8);
+        // In 20 ms the axis changes by 20 mm/s.
+        for (before, expected) in [(29.0, true), (31.0, false)] {
+            plan.feeds = vec![before, 100.0, 5.0];
+            plan.modes = vec![Mode::Flow, Mode::Flow, Mode::Rest];
+            assert_eq!(plan.may_lower(ring, 1, 10.0, false), expected, "{before}");
+            // On the way back the block before is seen to afterwards.
+            assert!(plan.may_lower(ring, 1, 10.0, true));
+            plan.modes[0] = Mode::Late;
+            assert!(plan.may_lower(ring, 1, 10.0, false));
+        }
+        for fixed in [false, true] {
+            plan.fixed = fixed;
+            for backward in [false, true] {
+                assert_eq!(plan.may_lower(ring, 0, 10.0, backward), !fixed);
+                assert!(plan.may_lower(ring, 1, 10.0, backward));
+            }
+        }
+    }
+
+    #[test]
+    fn full_overlap_is_for_feeds_that_the_axes_change_in_it() {
+        let rules = Rules::new(&Options::default(), &context(&[axis(1000.0); 2], 0.001));
+        let buffer = line(&rules);
+        let ring = buffer.ring();
+        let blocks = [ring.entry(0), ring.entry(1)];
+        for (feeds, expected) in [
+            ([10.0, 29.0], true),
+            ([29.0, 10.0], true),
+            ([10.0, 31.0], false),
+            ([31.0, 10.0], false),
+        ] {
+            assert_eq!(
+                is_flow(ring.corner(0), blocks, feeds),
+                expected,
+                "{feeds:?}"
+            );
+        }
+    }
 }
