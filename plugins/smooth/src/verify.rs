@@ -379,7 +379,7 @@ fn is_close<const L: usize>(run: &Run<'_, L>, (from, to): (f64, f64)) -> bool {
 /// A turn by more than this is one by which the path may come close to itself.
 const TURNS: f64 = 0.1;
 
-/// Way before the start in which vertices are looked at again: the samples behind the start are new.
+/// Way before the start, mm, in which vertices are looked at again: the samples behind the start are new.
 const AROUND: f64 = 0.05;
 
 #[inline(always)]

@@ -12,7 +12,7 @@ use crate::verify::larger;
 
 /// Share of the tolerance that boxes use.
 pub const BOX_SHARE: f64 = 0.955;
-/// A turn by more than this always has a waypoint.
+/// A turn by more than this, as the size of the change of direction, always has a waypoint.
 const SHARP: f64 = 0.1;
 /// Share of a feed below which another is another feed.
 const OTHER_FEED: f64 = 0.99;
