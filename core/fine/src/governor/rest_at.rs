@@ -72,3 +72,52 @@ impl Governor {
         met
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan_ahead::{Ahead, TWO_LINEAR};
+    use crate::steps::Recent;
+    use tandem_sdk::{AxisVector, Segment, SegmentFlags};
+
+    /// A rest is met from where a stop and two periods at the present speed are no longer than the way to it.
+    #[test]
+    fn a_rest_is_met_where_a_stop_and_two_periods_fit_before_it() {
+        const PERIOD_S: f64 = 0.001;
+        let mut segment = Segment::rest(&AxisVector::ZERO, 1.0);
+        segment.coefficients[0] = [0.0, 50.0, 0.0, 0.0, 0.0, 0.0];
+        segment.path = segment.coefficients[0];
+        segment.flags = SegmentFlags::default();
+        let ahead = Ahead::new(&segment, Some(0.1), 0, None);
+        let way = |sigma: f64| RateState {
+            sigma,
+            rate_per_s: 0.0,
+            place: ahead.place(TWO_LINEAR),
+            recent: Recent::default(),
+        };
+        for sigma in [0.2, 0.5, 1.0] {
+            let speed = 50.0 * sigma;
+            // 1000 mm/s² are built up in 0.1 s, and not reached: half of the way of a ramp to rest takes √(v/j).
+            let stop_mm = speed * f64::sqrt(speed / 10_000.0);
+            let needed_mm = stop_mm + LINE_END_PERIODS * PERIOD_S * speed;
+            for (room, expected) in [(1.0 + 1e-6, true), (1.0 - 1e-6, false)] {
+                let rest = RestAt {
+                    path_mm: 5.0 + room * needed_mm,
+                    max_mm_per_s2: 1000.0,
+                    jerk_mm_per_s3: 10_000.0,
+                };
+                assert_eq!(
+                    rest.is_met(&way(sigma), PERIOD_S),
+                    expected,
+                    "{sigma} {room}"
+                );
+            }
+        }
+        let behind = RestAt {
+            path_mm: 0.0,
+            max_mm_per_s2: 1000.0,
+            jerk_mm_per_s3: 10_000.0,
+        };
+        assert!(behind.is_met(&way(0.0), PERIOD_S), "what rests has met it");
+    }
+}

@@ -298,6 +298,29 @@ mod tests {
         assert_eq!(*space.last_axes(), axes);
     }
 
+    /// Kinematics off by a little: what they find does not lead back.
+    struct Skewed;
+
+    impl Kinematics for Skewed {
+        fn to_joints(&self, axes: &AxisVector) -> AxisVector {
+            Doubled.to_joints(axes)
+        }
+
+        fn to_axes(&self, joints: &AxisVector) -> AxisVector {
+            AxisVector(joints.0.map(|joint| joint / 2.0 + 0.01))
+        }
+    }
+
+    #[test]
+    fn axes_are_found_from_joints_to_which_they_lead_back() {
+        let joints = AxisVector::from_slice(&[20.0, -6.0]);
+        let found = doubled().found_from(&config(), &joints);
+        assert_eq!(found, Some(AxisVector::from_slice(&[10.0, -3.0])));
+        let skewed = JointSpace::new(&config(), Some(Box::new(Skewed)));
+        assert_eq!(skewed.found_from(&config(), &joints), None);
+        assert_eq!(plain().found_from(&config(), &joints), None);
+    }
+
     #[test]
     fn the_loop_after_knows_what_homing_has_found_and_where_the_axes_were() {
         let mut last = doubled();
