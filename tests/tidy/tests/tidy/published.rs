@@ -58,6 +58,24 @@ fn published_crates_can_be_packaged() {
     expect_none("published crates", &findings);
 }
 
+/// Link-time optimisation works with the settings of the command itself, whatever its crates say: small, as `release` makes that, a run
+/// takes one and a half times the instructions.
+#[test]
+fn what_is_optimised_as_one_whole_is_optimised_for_speed() {
+    let profiles = &table("Cargo.toml")["profile"];
+    let whole: Vec<_> = profiles
+        .as_table()
+        .unwrap()
+        .iter()
+        .filter(|(_, profile)| profile.get("lto").and_then(Value::as_str) == Some("fat"))
+        .collect();
+    assert_eq!(whole.len(), 1);
+    for (name, profile) in whole {
+        let level = profile.get("opt-level").and_then(Value::as_integer);
+        assert_eq!(level, Some(3), "profile {name}");
+    }
+}
+
 #[test]
 fn the_python_client_has_the_version_of_the_workspace() {
     let client = table("scripts/python/pyproject.toml");
