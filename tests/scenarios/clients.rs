@@ -268,10 +268,11 @@ fn a_program_is_run_with_the_words_of_the_one_shot_command() {
         (
             blocks.to_string(),
             said.contains("limit violations 0, guard stops 0"),
+            said.contains("\nlargest jerk, which is only reported: "),
         )
     };
     assert_eq!(begins(&there), begins(&alone));
-    assert!(begins(&there).1);
+    assert!(begins(&there).1 && begins(&there).2);
     let summary = std::fs::read(served.at("s.json")).unwrap();
     let summary: Value = serde_json::from_slice(&summary).unwrap();
     assert!(

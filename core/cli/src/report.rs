@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use tandem_machine::{JerkMode, Machine};
-use tandem_recorder::{Output, PlanningRow, RecordError, Summary, age};
+use tandem_recorder::{
+    Output, PlanningRow, RecordError, Summary, age, worst_of_judged, worst_of_reported,
+};
 use tandem_report::{Axis, Ended, Report, Samples, Signal, Unit};
 use tandem_rings::Sample;
 use tandem_sdk::{Axes, AxisVector, Block, BlockReport, Curve};
@@ -222,7 +224,8 @@ fn facts(summary: &Summary) -> Vec<(String, String)> {
         ),
         fact(
             "largest share of a limit, beyond it",
-            worst_of_judged(summary).unwrap_or_else(|| "none".to_string()),
+            worst_of_judged(&summary.jerk, &summary.worst_of_limits)
+                .unwrap_or_else(|| "none".to_string()),
         ),
         fact(
             "governed samples, starvations",
@@ -230,7 +233,8 @@ fn facts(summary: &Summary) -> Vec<(String, String)> {
         ),
     ];
     facts.extend(
-        worst_of_reported(summary).map(|worst| fact("largest jerk, which is only reported", worst)),
+        worst_of_reported(&summary.jerk, &summary.worst_of_limits)
+            .map(|worst| fact("largest jerk, which is only reported", worst)),
     );
     facts.extend(
         summary
@@ -273,30 +277,6 @@ fn facts(summary: &Summary) -> Vec<(String, String)> {
             .map(|fault| fact("fault", fault.clone())),
     );
     facts
-}
-
-/// The worst sample beyond a limit that is judged, with its size, whatever tolerance it is within.
-pub(crate) fn worst_of_judged(summary: &Summary) -> Option<String> {
-    let (what, of, within) = summary.worst_beyond()?;
-    let within = if of.share <= within {
-        "within"
-    } else {
-        "beyond"
-    };
-    let percent = of.share * 100.0;
-    Some(format!(
-        "{what} {percent:.2} % at tick {}, line {}, {}, {within} the tolerance",
-        of.tick, of.line, of.state
-    ))
-}
-
-/// The worst jerk beyond its limit where jerk is reported and not judged.
-pub(crate) fn worst_of_reported(summary: &Summary) -> Option<String> {
-    let (axis, of) = summary.worst_reported_jerk()?;
-    Some(format!(
-        "{axis} {:.2} times its limit at tick {}, line {}, {}",
-        of.share, of.tick, of.line, of.state
-    ))
 }
 
 /// The histogram of planning times, by doublings; short ones together.

@@ -14,7 +14,8 @@ use tandem_host::{
 };
 use tandem_machine::Machine;
 use tandem_recorder::{
-    BlocksCsv, EventsCsv, Output, PolicySummary, RecordError, RoughCsv, Stop, Summary,
+    BlocksCsv, EventsCsv, OfLimits, Output, PolicySummary, RecordError, RoughCsv, Stop, Summary,
+    worst_of_judged, worst_of_reported,
 };
 use tandem_rings::{Rest, Sample};
 use tandem_sdk::{Block, BlockReport, Curve, Event, EventKind};
@@ -24,7 +25,7 @@ use crate::broken::Broken;
 use crate::home::Corrections;
 use crate::operator::{Keyboard, Operator, Presence, tell};
 use crate::progress::Progress;
-use crate::report::{Collector, worst_of_judged, worst_of_reported};
+use crate::report::Collector;
 use crate::trace::TraceSink;
 use crate::warnings::tell_warnings;
 use crate::{FAULT, REFUSED, args, built_in, clock, hang, operator, piped, program, refusal};
@@ -479,6 +480,8 @@ pub struct Driven {
     starvations: u64,
     max_path_deviation_mm: f64,
     limited_by_s: BTreeMap<String, f64>,
+    jerk: String,
+    worst_of_limits: BTreeMap<String, OfLimits<String>>,
 }
 
 impl Driven {
@@ -499,6 +502,12 @@ impl Driven {
             starvations: summary.starvations,
             max_path_deviation_mm: summary.max_path_deviation_mm,
             limited_by_s: summary.limited_by_s.clone(),
+            jerk: summary.jerk.clone(),
+            worst_of_limits: summary
+                .worst_of_limits
+                .iter()
+                .map(|(axis, of)| (axis.clone(), of.owned()))
+                .collect(),
         }
     }
 }
@@ -555,10 +564,16 @@ impl fmt::Display for Driven {
             .iter()
             .map(|(name, percent)| format!("{name} {percent} %"))
             .collect();
-        if parts.is_empty() {
-            return Ok(());
+        if !parts.is_empty() {
+            writeln!(f, "time: {}", parts.join(", "))?;
         }
-        writeln!(f, "time: {}", parts.join(", "))
+        if let Some(worst) = worst_of_judged(&self.jerk, &self.worst_of_limits) {
+            writeln!(f, "largest share of a limit: {worst}")?;
+        }
+        if let Some(worst) = worst_of_reported(&self.jerk, &self.worst_of_limits) {
+            writeln!(f, "largest jerk, which is only reported: {worst}")?;
+        }
+        Ok(())
     }
 }
 
@@ -566,12 +581,6 @@ fn print_outcome(out: &mut impl Write, options: &args::Run, summary: &Summary) -
     write!(out, "{}", Driven::of(summary))?;
     if let Some(timing) = summary.timing() {
         writeln!(out, "{timing}")?;
-    }
-    if let Some(worst) = worst_of_judged(summary) {
-        writeln!(out, "largest share of a limit: {worst}")?;
-    }
-    if let Some(worst) = worst_of_reported(summary) {
-        writeln!(out, "largest jerk, which is only reported: {worst}")?;
     }
     if let Some(stop) = longest(&summary.stops) {
         print_stop(out, summary, stop)?;

@@ -4,6 +4,7 @@
 //! [`Summary`]; [`TraceCsv`], [`BlocksCsv`] and [`EventsCsv`] write them down as they come. A file that cannot be written any
 //! further is a value ([`RecordError`]), and what becomes of the motion then is not decided here.
 
+mod beyond;
 mod block_times;
 mod curve_watch;
 mod joint_peaks;
@@ -17,6 +18,7 @@ mod stops;
 mod summary;
 mod worst;
 
+pub use beyond::{worst_of_judged, worst_of_reported};
 pub use block_times::{BlockTimes, TimeGoesTo};
 pub use curve_watch::{CurveWatch, OnCurve};
 pub use joint_peaks::{JointPeaks, JointWatch, WatchedJoint};

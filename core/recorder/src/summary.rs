@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::joint_peaks::JointPeaks;
 use crate::lateness::Lateness;
@@ -255,8 +255,8 @@ pub struct ExchangeUs {
 }
 
 /// The sample that used most of a limit.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct OfLimit {
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct OfLimit<S = &'static str> {
     /// Share of the limit; zero where there is none.
     pub share: f64,
     /// Its tick.
@@ -264,62 +264,35 @@ pub struct OfLimit {
     /// Its program line.
     pub line: u32,
     /// What the machine was doing.
-    pub state: &'static str,
+    pub state: S,
 }
 
 /// What was used most of the limits of an axis.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct OfLimits {
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct OfLimits<S = &'static str> {
     /// Of its highest speed.
-    pub velocity: OfLimit,
+    pub velocity: OfLimit<S>,
     /// Of its acceleration.
-    pub acceleration: OfLimit,
+    pub acceleration: OfLimit<S>,
     /// Of its jerk, where it has a limit.
-    pub jerk: OfLimit,
+    pub jerk: OfLimit<S>,
 }
 
-/// A share of a limit that is larger than 1 by less than that is rounding.
-const TOLERANCE: f64 = 1e-6;
-
-impl Summary {
-    /// The worst jerk beyond its limit where jerk is reported and not judged: the axis and the sample. `None` where none is
-    /// beyond, and where it is judged: there it is one of [`Self::worst_beyond`].
-    pub fn worst_reported_jerk(&self) -> Option<(String, OfLimit)> {
-        if self.jerk == "limit" {
-            return None;
+impl OfLimits {
+    /// The same, as it is read from a file.
+    #[must_use]
+    pub fn owned(self) -> OfLimits<String> {
+        let owned = |of: OfLimit| OfLimit {
+            share: of.share,
+            tick: of.tick,
+            line: of.line,
+            state: of.state.to_string(),
+        };
+        OfLimits {
+            velocity: owned(self.velocity),
+            acceleration: owned(self.acceleration),
+            jerk: owned(self.jerk),
         }
-        let each = self.worst_of_limits.iter();
-        each.map(|(axis, of)| (axis.to_uppercase(), of.jerk))
-            .filter(|(_, of)| of.share > 1.0 + TOLERANCE)
-            .max_by(|(_, a), (_, b)| a.share.total_cmp(&b.share))
-    }
-
-    /// The worst sample beyond a limit that counts on this machine: what is exceeded, such as `X jerk`, the sample, and the
-    /// share up to which it is within the tolerance. `None` where no sample is beyond.
-    pub fn worst_beyond(&self) -> Option<(String, OfLimit, f64)> {
-        const JERK_TOLERANCE: f64 = 1e-2;
-        let jerk_counts = self.jerk == "limit";
-        let each = self.worst_of_limits.iter().flat_map(|(axis, of)| {
-            let jerk = jerk_counts.then_some(("jerk", of.jerk, JERK_TOLERANCE));
-            let others = [
-                ("velocity", of.velocity, TOLERANCE),
-                ("acceleration", of.acceleration, TOLERANCE),
-            ];
-            others
-                .into_iter()
-                .chain(jerk)
-                .map(move |(name, of, tolerance)| {
-                    (
-                        format!("{} {name}", axis.to_uppercase()),
-                        of,
-                        1.0 + tolerance,
-                    )
-                })
-        });
-        let beyond = each.filter(|(_, of, _)| of.share > 1.0 + TOLERANCE);
-        beyond.max_by(|(_, a, within_a), (_, b, within_b)| {
-            (a.share / within_a).total_cmp(&(b.share / within_b))
-        })
     }
 }
 
