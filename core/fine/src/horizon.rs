@@ -238,4 +238,41 @@ mod tests {
         assert!((near / far - 10.0).abs() < 1e-9, "{near} and {far} mm/s³");
         assert_eq!(far, horizon.path_jerk_mm_per_s3);
     }
+
+    /// 0.03 s at 10 mm/s, then with 10 mm/s²: an axis takes 0.1 s to all of its acceleration, and so far is looked.
+    #[test]
+    fn places_ahead_are_those_of_the_segment_that_they_lie_in() {
+        let axis = AxisLimits {
+            acceleration_mm_per_s2: 100.0,
+            jerk_mm_per_s3: 1000.0,
+            ..AxisLimits::unlimited()
+        };
+        let (mut input, output) = RingBuffer::new(8);
+        for (rise, duration_s) in [(0.0, 0.03), (10.0, 1.0)] {
+            let mut segment = Segment::rest(&AxisVector::ZERO, duration_s);
+            segment.flags = SegmentFlags::default();
+            segment.coefficients[0] = [0.0, 10.0, rise / 2.0, 0.0, 0.0, 0.0];
+            segment.path = segment.coefficients[0];
+            let start_s = 0.0;
+            input.push(Queued::Segment { start_s, segment }).unwrap();
+        }
+        let mut cursor = Cursor::new(output, &AxisVector::ZERO);
+        cursor.advance(1e-9, |_| false);
+        let mut horizon = Horizon::new(&[axis; MAX_AXES], 2, 0.001);
+        assert!(horizon.is_steady());
+        horizon.fill(&cursor.ahead(), 0.001);
+        assert!(!horizon.is_steady(), "the second segment gets faster");
+        let mut risen = 0;
+        for point in horizon.iter() {
+            let expected = 10.0 + 10.0 * (point.offset_s - 0.03).max(0.0);
+            let velocity = point.motion.velocity[0];
+            assert!(
+                (velocity - expected).abs() < 1e-6,
+                "{velocity} at {}",
+                point.offset_s
+            );
+            risen += u32::from(velocity > 10.1);
+        }
+        assert!(risen > 3, "{risen}");
+    }
 }

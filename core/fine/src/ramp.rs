@@ -447,4 +447,21 @@ mod tests {
             prop_assert!(gone <= end * (1.0 + 1e-9) + 1e-12, "{gone} of {end}");
         }
     }
+
+    /// Without a jerk limit a coordinate slows by what its acceleration takes in a period, and its last sample stands.
+    #[test]
+    fn a_lane_without_a_jerk_limit_slows_by_its_acceleration() {
+        for sign in [-1.0, 1.0] {
+            let mut lane = Lane {
+                velocity: sign * 2.5,
+                acceleration: 0.0,
+                most: 1000.0,
+                jerk: f64::INFINITY,
+            };
+            for speed in [1.5, 0.5, 0.0, 0.0] {
+                lane.slow(0.001);
+                assert_eq!(lane.velocity, sign * speed);
+            }
+        }
+    }
 }

@@ -483,6 +483,30 @@ pub(super) mod tests {
         }
     }
 
+    /// Where no way is known a rate becomes constant at once, or by as much as the jerk limit allows; neither is beyond the limit.
+    #[test]
+    fn a_rate_without_a_way_becomes_constant_within_the_jerk_limit() {
+        let limits = limits(1000.0, 10_000.0);
+        let segment = along_x([50.0, 0.0, 0.0], 0.2);
+        let mut horizon = Horizon::new(&limits, 2, PERIOD_S);
+        horizon.fill(&Ahead::new(&segment, Some(0.0), 0, None), PERIOD_S);
+        // In a period 10 000 mm/s³ change a rate along 50 mm/s by 0.2 per second.
+        let most = ORDER3_LIMIT_SHARE * 0.2;
+        for (rate, expected) in [
+            (0.1, 0.0),
+            (-0.1, 0.0),
+            (0.5, 0.5 - most),
+            (-0.5, most - 0.5),
+        ] {
+            let mut governor = Governor::new(&limits, 2, PERIOD_S);
+            (governor.sigma, governor.rate_per_s) = (0.5, rate);
+            let chosen = governor.relaxed(&horizon, &Steps::default());
+            assert!(!chosen.relaxed, "{rate}");
+            let found = governor.rate_per_s();
+            assert!((found - expected).abs() < 1e-9, "{rate}: {found}");
+        }
+    }
+
     /// Where a period may change much of the rate, the end of its approach to 1 is not taken where the plan is a little faster than the feed.
     #[test]
     fn the_end_of_an_approach_keeps_the_feed() {

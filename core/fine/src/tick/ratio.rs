@@ -163,6 +163,7 @@ impl StrategyRatio {
 mod tests {
     use super::*;
     use rtrb::RingBuffer;
+    use tandem_sdk::{AxisLimits, Limits};
 
     #[test]
     fn a_rate_is_lowered_where_the_plan_is_above_what_is_allowed() {
@@ -190,6 +191,39 @@ mod tests {
         assert!(strategy.now() < 1.0);
         assert_eq!(strategy.take(8), 2);
         assert_eq!(strategy.take(9), 0);
+    }
+
+    /// What the strategy and the operator ask for goes together, each where the program permits it.
+    #[test]
+    fn the_ratios_of_strategy_and_operator_multiply_where_they_are_permitted() {
+        let axis = AxisLimits::unlimited();
+        let plain = FineConfig::new(0.001, Limits::new(&[axis]).unwrap());
+        let taken = FineConfig {
+            strategy_takes_override: true,
+            ..plain
+        };
+        let mut strategy = strategy(&[(0, 0.6)]);
+        strategy.take(0);
+        let (now, mean) = (strategy.now(), strategy.mean());
+        assert!(now < mean && mean < 1.0);
+        let inputs = OperatorInputs {
+            feed_override: 1.5,
+            rapid_override: 0.25,
+            ..OperatorInputs::default()
+        };
+        let outputs = Outputs::new(false, 0);
+        let of = |config, outputs: &Outputs| {
+            let ratios = strategy.in_force(config, outputs, &inputs);
+            [ratios.feed, ratios.mean_feed, ratios.rapid]
+        };
+        assert_eq!(of(&plain, &outputs), [1.5 * now, 1.5 * mean, 0.25]);
+        assert_eq!(of(&taken, &outputs), [now, mean, 0.25]);
+        let mut fixed = Outputs::new(false, 0);
+        fixed.override_permitted = false;
+        assert_eq!(of(&plain, &fixed), [now, mean, 1.0]);
+        let mut steady = Outputs::new(false, 0);
+        steady.adaptive_permitted = false;
+        assert_eq!(of(&plain, &steady), [1.5, 1.5, 0.25]);
     }
 
     #[test]

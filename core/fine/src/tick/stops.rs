@@ -142,3 +142,35 @@ impl Stops {
         true
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rtrb::RingBuffer;
+
+    #[test]
+    fn drives_are_told_once_what_they_are_to_catch() {
+        let (rests, _reader) = RingBuffer::new(1);
+        let mut stops = Stops::new(rests);
+        let rising = StopOn {
+            input: 3,
+            edge: Edge::Rising,
+            ..StopOn::default()
+        };
+        let falling = StopOn {
+            edge: Edge::Falling,
+            ..rising
+        };
+        assert!(
+            !stops.arm_for(&StopOn::default()),
+            "there is nothing to catch"
+        );
+        for edge in [rising, falling] {
+            assert!(stops.arm_for(&edge));
+            assert!(!stops.arm_for(&edge), "they know it");
+            assert_eq!(stops.arm(), arm_for(&edge));
+        }
+        assert!(!stops.arm_for(&StopOn::default()));
+        assert_eq!(stops.arm(), Arm::default());
+    }
+}
