@@ -204,6 +204,7 @@ mod tests {
                 s,
                 length,
                 feed: 10.0,
+                pace: 10.0,
                 tolerance,
                 speed: 10.0,
                 turn_s: 0.1,

@@ -7,7 +7,7 @@ use crate::route::Run;
 use crate::verify::larger;
 use crate::window::{Piece, Window};
 
-/// The feed of intervals, asked for in order: the lowest of the chords whose waypoints lie in or next to one. A vertex has both
+/// The pace of intervals, asked for in order: the lowest of the chords whose waypoints lie in or next to one. A vertex has both
 /// of its chords: speed at the end of an interval is what the next one allows.
 pub struct Feeds<'a, const L: usize> {
     pub run: &'a Run<'a, L>,
@@ -18,7 +18,7 @@ pub struct Feeds<'a, const L: usize> {
 }
 
 impl<const L: usize> Feeds<'_, L> {
-    /// The feed of interval `k`.
+    /// The pace of interval `k`.
     #[inline(always)]
     pub fn of(&mut self, k: usize) -> f64 {
         while self.at + 1 < self.waypoints.len()
@@ -31,9 +31,9 @@ impl<const L: usize> Feeds<'_, L> {
         while n < self.waypoints.len() {
             let s = self.along[n].0;
             let chord = self.along[n].1 as usize;
-            feed = feed.min(self.run.chords[chord].feed);
+            feed = feed.min(self.run.chords[chord].pace);
             if chord > 0 && s <= self.run.chords[chord].s {
-                feed = feed.min(self.run.chords[chord - 1].feed);
+                feed = feed.min(self.run.chords[chord - 1].pace);
             }
             if (self.waypoints[n].interval as usize) > k {
                 break;
@@ -45,7 +45,7 @@ impl<const L: usize> Feeds<'_, L> {
                 .run
                 .chords
                 .iter()
-                .fold(f64::INFINITY, |least, chord| least.min(chord.feed));
+                .fold(f64::INFINITY, |least, chord| least.min(chord.pace));
         }
         feed
     }
@@ -129,7 +129,7 @@ mod tests {
             .collect();
         let mut chords = lines(&points);
         for (chord, feed) in chords.iter_mut().zip(feeds) {
-            chord.feed = *feed;
+            (chord.feed, chord.pace) = (*feed, *feed);
         }
         let run = open(&chords);
         let along: Vec<_> = waypoints

@@ -224,6 +224,7 @@ pub(crate) mod tests {
                 s: s - length,
                 length,
                 feed: 1.0,
+                pace: 1.0,
                 tolerance: TOLERANCE,
                 speed: 1.0,
                 turn_s: 1.0,

@@ -217,6 +217,49 @@ pub fn derivatives<const L: usize>(
     reached
 }
 
+/// How far pieces one after the other turn from the way between their ends: the largest acceleration across it, and the largest velocity
+/// across it as a share of that along it; infinite where they go back. Velocities lie in the cone of their control points.
+pub fn turning<const L: usize>(pieces: &[Piece<L>]) -> (f64, f64) {
+    let (Some(first), Some(last)) = (pieces.first(), pieces.last()) else {
+        return (0.0, 0.0);
+    };
+    let way: Lanes<L> = {
+        let end = last.position(last.duration_s);
+        each(|l| end[l] - first.c[0][l])
+    };
+    let size = dot(&way, &way).sqrt().max(f64::MIN_POSITIVE);
+    let direction = way.map(|v| v / size);
+    // Along the way and across it.
+    let parts = |value: &Lanes<L>| {
+        let along = dot(value, &direction);
+        let across: Lanes<L> = each(|l| value[l] - along * direction[l]);
+        (along, dot(&across, &across).sqrt())
+    };
+    let controls = || pieces.iter().map(control_of);
+    let fastest = controls()
+        .flat_map(|control| control.velocity)
+        .fold(0.0, |most, v| larger(most, dot(&v, &v).sqrt()));
+    let across = controls()
+        .flat_map(|control| control.acceleration)
+        .fold(0.0, |most, a| larger(most, parts(&a).1));
+    let share = controls()
+        .flat_map(|control| control.velocity)
+        .fold(0.0, |most, v| {
+            let (along, across) = parts(&v);
+            if along.abs() + across <= STANDS * fastest {
+                most
+            } else if along > 0.0 {
+                larger(most, across / along)
+            } else {
+                f64::INFINITY
+            }
+        });
+    (across, share)
+}
+
+/// Share of the highest velocity below which one is the rounding of a rest.
+const STANDS: f64 = 1e-6;
+
 /// Share of an acceleration limit that counts as left at least, for the moment that turning takes all of it.
 const MIN_LEFT: f64 = 0.02;
 
@@ -333,6 +376,52 @@ mod tests {
                 assert!((time_s - 5.0 / left).abs() < 1e-9, "{a:?}: {time_s} s");
             }
         }
+    }
+
+    #[test]
+    fn a_piece_turns_from_its_way_by_no_more_than_is_said() {
+        let mut random = Random::new(1);
+        let mut finite = 0;
+        for _ in 0..500 {
+            let duration_s = random.length(1e-3, 0.05);
+            let mut state = |x: f64| {
+                let [y, v, a] = [0.1, 0.5, 2.0].map(|most| random.between(-most, most));
+                [
+                    [x, y],
+                    [1.0 / duration_s, v / duration_s],
+                    [0.0, a / duration_s / duration_s],
+                ]
+            };
+            let piece = Piece::between(&state(0.0), &state(1.0), 0.0, duration_s);
+            let (across, share) = turning(&[piece]);
+            finite += u32::from(share.is_finite());
+            let end = piece.position(duration_s);
+            let way: Lanes<2> = each(|l| end[l] - piece.c[0][l]);
+            let size = dot(&way, &way).sqrt();
+            let normal = [-way[1] / size, way[0] / size];
+            for n in 0..=1000 {
+                let t = f64::from(n) / 1000.0 * duration_s;
+                let (v, a) = (piece.velocity(t), piece.acceleration(t));
+                assert!(dot(&a, &normal).abs() <= across * (1.0 + 1e-9));
+                let along = dot(&v, &way) / size;
+                assert!(
+                    share.is_infinite()
+                        || along > 0.0 && dot(&v, &normal).abs() <= share * along * (1.0 + 1e-9)
+                );
+            }
+        }
+        assert!(finite > 100, "{finite} go forward");
+        // One that goes back has no way, and one that stands has none to turn from.
+        let rest = |x: f64| [[x, 0.0], [0.0; 2], [0.0; 2]];
+        let back = [
+            Piece::between(&rest(0.0), &rest(3.0), 0.0, 1.0),
+            Piece::between(&rest(3.0), &rest(1.0), 1.0, 1.0),
+        ];
+        assert_eq!(turning(&back).1, f64::INFINITY);
+        assert_eq!(
+            turning(&[Piece::between(&rest(1.0), &rest(1.0), 0.0, 1.0)]),
+            (0.0, 0.0)
+        );
     }
 
     #[test]

@@ -14,6 +14,9 @@ const BEHIND: f64 = 2.0;
 const STEPS: usize = 16;
 /// Chords of one block for which there is room to be made at once: no more than they take.
 const MANY: usize = 16_384;
+/// Share of the tolerance that may lie between two samples on a curve. With a tenth more a window that is refused for it is found
+/// only after some that are slower.
+const BETWEEN_SAMPLES: f64 = 0.5;
 /// Direction cosine between blocks below which the path turns back: it rests there (a quarter of a degree off).
 const TURNS_BACK: f64 = -0.999_99;
 
@@ -30,6 +33,8 @@ pub struct Chord<const L: usize> {
     pub length: f64,
     /// Path speed that may be driven, as path speed counts, mm/s or rad/s; infinite for rapids.
     pub feed: f64,
+    /// The feed, or where a curve bends less: with half of the tolerance lying between two samples.
+    pub pace: f64,
     /// What the motion may stand off the chord.
     pub tolerance: f64,
     /// Speed of the lanes along it at most, and the time in which the slowest of them builds that up, s.
@@ -247,12 +252,16 @@ impl<const L: usize> Route<L> {
             let start = from;
             let s = self.end;
             let speed = fastest;
+            if flat.curved && self.first + (self.chords.len() as u64) > first_chord {
+                self.pace_last(turn, &counted, frame.period_s);
+            }
             self.chords.push(Chord {
                 start,
                 direction,
                 s,
                 length,
                 feed,
+                pace: feed,
                 tolerance,
                 speed,
                 turn_s,
@@ -278,6 +287,18 @@ impl<const L: usize> Route<L> {
             chords,
         }));
         min_s
+    }
+
+    /// Paces the last chord of a curve, behind which the path turns by `turn`: where it bends at both of its ends it does so for longer
+    /// than a sample.
+    fn pace_last(&mut self, turn: f64, counted: &Lanes<L>, period_s: f64) {
+        let Some(chord) = self.chords.last_mut() else {
+            return;
+        };
+        let bend = turn.min(chord.turn) / chord.length;
+        let speed = (8.0 * BETWEEN_SAMPLES * chord.tolerance / bend).sqrt() / period_s;
+        let per: Lanes<L> = std::array::from_fn(|l| counted[l] * chord.direction[l]);
+        chord.pace = chord.feed.min(speed * dot(&per, &per).sqrt());
     }
 
     /// The machine rests at `s`: what lies before it belongs to no run any more.
@@ -343,5 +364,51 @@ impl<const L: usize> Route<L> {
         self.first = 0;
         self.run_first = 0;
         self.end = 0.0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tandem_sdk::AxisVector;
+
+    /// A quarter of a circle of 10 mm from the end of a line, at a feed that no sample could follow within 0.1 µm.
+    #[test]
+    fn a_curve_is_paced_so_that_half_of_its_tolerance_lies_between_samples_and_a_line_is_not() {
+        const RADIUS: f64 = 10.0;
+        const TOLERANCE: f64 = 1e-4;
+        let context = tandem_rig::context(&[tandem_rig::axis(1e6); 2], 1e-3);
+        let frame = Frame::<2>::new(&context);
+        let mut route = Route::default();
+        let feed = 500.0;
+        let mut line = Block::at(AxisVector::from_slice(&[-1.0, 0.0]));
+        line.end = AxisVector::from_slice(&[0.0, 0.0]);
+        line.kind = BlockKind::Line;
+        line.length_mm = 1.0;
+        line.feed_mm_per_s = feed;
+        let mut arc = line;
+        arc.kind = BlockKind::Arc;
+        arc.start = line.end;
+        arc.end = AxisVector::from_slice(&[RADIUS, RADIUS]);
+        let on_arc = |angle: f64| [RADIUS * angle.sin(), RADIUS - RADIUS * angle.cos()];
+        let angles = (1..=200).map(|n| f64::from(n) / 200.0 * std::f64::consts::FRAC_PI_2);
+        let mut flat = Flat::default();
+        flat.points = vec![[0.0, 0.0]];
+        route.push(&line, &flat, &frame, 1.0, TOLERANCE);
+        (flat.points, flat.curved) = (angles.map(on_arc).collect(), true);
+        route.push(&arc, &flat, &frame, 1.0, TOLERANCE);
+        let run = route.run(0.0, true);
+        assert_eq!(run.chords.len(), 201);
+        for (n, chord) in run.chords.iter().enumerate() {
+            let sagitta = chord.pace * chord.pace * 1e-6 / (8.0 * RADIUS);
+            let share = sagitta / chord.tolerance;
+            // The last chord does not know yet how the path goes on, the first of the curve begins with a corner of half its turn.
+            match n {
+                0 | 200 => assert_eq!(chord.pace, feed),
+                1 => assert!((0.98..=1.02).contains(&share), "{share}"),
+                _ => assert!((0.49..=0.51).contains(&share), "{n}: {share}"),
+            }
+            assert_eq!(chord.feed, feed);
+        }
     }
 }

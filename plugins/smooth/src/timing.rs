@@ -309,13 +309,13 @@ fn next_node<const L: usize>(
     }
 }
 
-/// The lane speed along a chord at which path speed reaches the feed.
+/// The lane speed along a chord at which path speed reaches its pace.
 #[inline(always)]
 pub fn feed<const L: usize>(chord: &Chord<L>, counted: &Lanes<L>) -> f64 {
     let weighted: Lanes<L> = each(|l| counted[l] * chord.direction[l]);
     let size = weighted.iter().map(|v| v * v).sum::<f64>().sqrt();
     if size > 0.0 && largest(&weighted) > 0.0 {
-        chord.feed / size
+        chord.pace / size
     } else {
         f64::INFINITY
     }

@@ -14,7 +14,7 @@ use crate::beside::{
 use crate::feeds::Feeder;
 use crate::frame::{Frame, dot};
 use crate::order::{Order, REACH};
-use crate::peaks::{bound, derivatives, highest, positions};
+use crate::peaks::{bound, derivatives, highest, positions, turning};
 use crate::plan::Start;
 use crate::route::Run;
 use crate::travel::Travel;
@@ -320,7 +320,17 @@ impl<const L: usize> Checker<L> {
             .sqrt();
         let change = self.jerks[near] * period_s;
         let turned = (bend * period_s / squared.sqrt().max(1e-9)).min(1.0);
-        (across + change + turned * bend).min(bend) * period_s * period_s / 8.0
+        let local = (across + change + turned * bend).min(bend);
+        // Where it brakes hard within a sample neither its speed nor its acceleration there says how far it turns.
+        let pieces = &window.pieces;
+        let first = pieces.partition_point(|piece| piece.end_s() < t - period_s);
+        let last = pieces.partition_point(|piece| piece.start_s < t + period_s);
+        let among = first.min(near)..last.max(near + 1);
+        let (across, turned) = turning(&pieces[among.clone()]);
+        let bend = self.bends[among]
+            .iter()
+            .fold(bend, |most, bend| larger(most, *bend));
+        local.min(across + turned * bend) * period_s * period_s / 8.0
     }
 
     /// The distance of `vertex` from the chain of those samples that may pass it, `among` which sample `near` is sought first.
@@ -409,7 +419,7 @@ mod tests {
     fn path(points: &[[f64; 2]], feed: f64) -> Vec<Chord<2>> {
         let mut chords = lines(points);
         for chord in &mut chords {
-            chord.feed = feed;
+            (chord.feed, chord.pace) = (feed, feed);
             chord.tolerance = TOLERANCE;
             chord.speed = feed;
         }
@@ -700,6 +710,46 @@ mod tests {
             let at = near.clamp(first, last.min(18));
             let around = least(at.saturating_sub(3).max(first), (at + 3).min(last.min(18)));
             assert!(found <= around.sqrt() || found < NEAR_ENOUGH);
+        }
+    }
+
+    /// From rest to rest in two samples, beside a line by a hundredth of its length: all of the acceleration is along it, but for as much.
+    #[test]
+    fn a_motion_that_brakes_within_a_sample_turns_no_more_than_it_does() {
+        for off in [0.0, 0.01] {
+            let mut window = rest_to_rest([0.0; 2], [1.0, 0.0], 2.0 * PERIOD_S, 1.0);
+            // As far aside at its middle.
+            let rest = [[0.0; 2]; 3];
+            let aside = Piece::between(&rest, &[[0.0, off], [0.0; 2], [0.0; 2]], 0.0, PERIOD_S);
+            let back = Piece::between(&rest, &[[0.0, -off], [0.0; 2], [0.0; 2]], 0.0, PERIOD_S);
+            let middle = window.pieces[0].state(PERIOD_S);
+            let end = window.pieces[0].state(2.0 * PERIOD_S);
+            let halves = [([[0.0; 2]; 3], middle, aside), (middle, end, back)];
+            window.pieces.clear();
+            for (n, (from, to, across)) in (0_u32..).zip(halves) {
+                let mut piece = Piece::between(&from, &to, f64::from(n) * PERIOD_S, PERIOD_S);
+                for (c, of_across) in piece.c.iter_mut().zip(&across.c) {
+                    c[1] += of_across[1];
+                }
+                piece.c[0][1] += f64::from(n) * off;
+                window.pieces.push(piece);
+            }
+            let size = |t: f64| {
+                let a = window.state(t)[2];
+                dot(&a, &a).sqrt()
+            };
+            let bend = (0..=200)
+                .map(|n| size(f64::from(n) * 1e-5))
+                .fold(0.0, larger);
+            let checker = Checker::<2> {
+                bends: vec![bend; 2],
+                jerks: vec![1e12; 2],
+                ..Checker::default()
+            };
+            let bulge = checker.bulge_around(&window, 0, PERIOD_S, PERIOD_S);
+            let most = bend * PERIOD_S * PERIOD_S / 8.0;
+            assert!(bulge <= 30.0 * off * most + 1e-12, "{bulge} of {most}");
+            assert!(bulge >= 0.5 * off * most, "{bulge} of {most}");
         }
     }
 
