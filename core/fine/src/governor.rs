@@ -62,8 +62,8 @@
 //! **Order 3.** An axis jerks by q‴σ³ + 3q″σσ̇ + q′σ̈. σ̈ is constant within a period. The points of the period give an
 //! interval for it, linear in σ̈. What is wanted of it comes from two time-optimal laws, one in σ (back to 1) and one
 //! in the path speed (down to a cap, or to rest); to rest it is never less braking than the second law asks of a plan of
-//! constant speed, for a plan that brakes for a corner gets faster again behind it. Taken of it is as much as leaves a way back: from the end of the
-//! period on σ̇ must come to zero, within the limits at the ends and in the middle of every stretch of a segment that a
+//! constant speed, for a plan that brakes for a corner gets faster again after it. The governor takes as much of that as
+//! still lets it make the rate constant again: from the end of the period on σ̇ must come to zero, within the limits at the ends and in the middle of every stretch of a segment that a
 //! period drives, within 0 ≤ σ ≤ 1, and within what is queued, tried out on the queued plan period by period. So σ
 //! comes to 0 and to 1 with σ̇ = 0. A constant σ is always admissible, and the way that was found is kept: where the
 //! next period finds no better one, it goes on that way to its end. At most five ways are tried in a period, each over

@@ -468,8 +468,8 @@ impl<'a> PlanCursor<'a> {
         }
     }
 
-    /// Goes from a rest to the start of what moves next; whether the place was at a rest, and something moves behind it.
-    pub fn begin_behind_rest(&mut self) -> bool {
+    /// Goes from a rest to the start of what moves next; whether the place was at a rest, and something moves after it.
+    pub fn begin_after_rest(&mut self) -> bool {
         let is_at_rest = self
             .segment
             .is_some_and(|it| ends(it) && self.local_s >= it.duration_s);

@@ -84,7 +84,7 @@ impl Governor {
         }
         let mut change = None;
         if let Some(below) = below {
-            if is_constant && here.place.begin_behind_rest() {
+            if is_constant && here.place.begin_after_rest() {
                 match below.rate_to_begin_with(here, &mut self.ways, horizon) {
                     Some(sigma) => self.sigma = sigma,
                     None => self.jump(below.kept_rate),
@@ -308,6 +308,9 @@ impl Governor {
     }
 
     /// `wanted` in small steps, which the limits do not ask for where next to nothing moves; larger ones to end an approach.
+    ///
+    /// A constant rate counts as a rising one. So the first step of a hold may be one of the larger ones, though it ends nothing:
+    /// the limits bound it all the same, and with the small bound there no test of this crate had another result.
     pub(super) fn small(&self, wanted: f64, horizon: &Horizon) -> f64 {
         let small = horizon.small_change_per_s2();
         let (down, up) = if self.rate_per_s < 0.0 {
