@@ -119,6 +119,10 @@ const LETTERS_Q: &str = "XYZRLQ";
 const PECK_CLEARANCE_MM: f64 = 0.254;
 /// A peck that ends nearer to the bottom is the last: the rounding of inches.
 const ROUNDING_MM: f64 = 1e-9;
+/// Moves of a peck: down, out to R, and back to just above where it ended.
+const MOVES_PER_PECK: f64 = 3.0;
+/// Most moves and dwells of a hole without pecks: a kind that makes more of them raises it.
+const MAX_MOVES_PER_HOLE: f64 = 8.0;
 /// Most moves of a line, so that memory stays bounded.
 const MAX_MOVES: f64 = 100_000.0;
 
@@ -141,7 +145,13 @@ impl Kind {
         matches!(self, Self::ChipBreaking | Self::Pecking)
     }
 
-    fn needs_dwell(self) -> bool {
+    /// Whether P, the time of a dwell, has to be given. It is needed wherever in the hole a kind dwells.
+    fn needs_dwell_time(self) -> bool {
+        self.dwells_at_bottom()
+    }
+
+    /// Whether it dwells for P at the bottom of the hole, before the way out.
+    fn dwells_at_bottom(self) -> bool {
         matches!(
             self,
             Self::DrillingDwell | Self::BoringStop | Self::BoringByHand | Self::BoringDwell
@@ -152,7 +162,7 @@ impl Kind {
 /// What the lines of a cycle leave to the next ones.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Cycles {
-    /// G99.
+    /// G98: cycles end where they began, not at R (G99).
     to_initial: bool,
     /// The cycle whose words these are, by its number in tenths.
     of: u16,
@@ -293,9 +303,9 @@ fn holes(line: &mut Line, kind: Kind, at: &AxisVector) -> Checked<Holes> {
     let dwell_s = sticky.dwell_s.unwrap_or_default();
     let moves = f64::from(count)
         * if kind.pecks() {
-            (r_mm - bottom_mm) / peck_mm * 3.0
+            (r_mm - bottom_mm) / peck_mm * MOVES_PER_PECK
         } else {
-            8.0
+            MAX_MOVES_PER_HOLE
         };
     if moves > MAX_MOVES {
         let message = format!("this line would make {moves:.0} moves, {MAX_MOVES:.0} are allowed");
@@ -341,7 +351,7 @@ fn sticky(line: &mut Line, kind: Kind, normal: usize) -> Checked<Sticky> {
         ),
         (sticky.depth_mm.is_none(), &bottom),
         (
-            kind.needs_dwell() && sticky.dwell_s.is_none(),
+            kind.needs_dwell_time() && sticky.dwell_s.is_none(),
             "P, the dwell in seconds",
         ),
         (
@@ -413,7 +423,7 @@ fn hole(line: &mut Line, holes: &Holes, at: &mut AxisVector) -> Checked<()> {
         return tap(line, holes, at, direction);
     }
     plunge(line, BlockKind::Line, at, normal, holes.bottom_mm)?;
-    if holes.kind.needs_dwell() {
+    if holes.kind.dwells_at_bottom() {
         line.dwell(holes.dwell_s);
     }
     match holes.kind {
