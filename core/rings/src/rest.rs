@@ -15,7 +15,7 @@ pub enum RestCause {
     Abort,
     /// All joints are enabled: planning starts here.
     Attached,
-    /// An axis is called otherwise from here on ([`tandem_sdk::EventKind::Correct`]); nothing has moved.
+    /// The position of an axis is set anew here ([`tandem_sdk::EventKind::Correct`]); nothing has moved.
     Corrected,
 }
 

@@ -37,7 +37,7 @@ pub trait Source {
 
     /// The machine rests at `rest.position`, before the end of what was planned: behind an edge that a block waited for
     /// ([`tandem_sdk::Block::stop_on`], after which nothing is asked for until this), after the operator's abort, or after
-    /// a jog that was let go; or it is called otherwise (homing); or the joints are enabled there, before anything moves. The
+    /// a jog that was let go; or the position of an axis is set anew there (homing); or the joints are enabled there, before anything moves. The
     /// next block starts there. Whether the stream goes on; where not, the program is over.
     fn provide_rest(&mut self, rest: &Rest) -> bool;
 }

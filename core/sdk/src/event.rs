@@ -30,8 +30,8 @@ pub enum EventKind {
     AdaptiveFeed = 11,
     /// Feed-hold permitted (M53): `value` 1 or 0.
     FeedHold = 12,
-    /// The coordinate of axis `index` is wrong by `value`, mm or rad, which is added to it: nothing moves, what stands is
-    /// called otherwise (homing). The machine is at rest.
+    /// The position of axis `index` is set anew (homing): `value`, mm or rad, is added to its coordinate. Nothing moves. The
+    /// machine is at rest.
     Correct = 13,
     /// Axis `index` is homed: its travel counts from here on.
     Homed = 14,

@@ -224,11 +224,11 @@ fn a_hold_interrupts_the_drive_and_a_resume_begins_anew() {
 }
 
 #[test]
-fn what_the_host_has_called_the_axis_before_is_forgotten() {
+fn what_the_host_has_set_the_position_to_before_is_forgotten() {
     let mut bench = unhomed(&mut Random::new(12));
     let before_mm = bench.position[HOMED];
     bench.queue_event(EventKind::Correct, (HOMED as u32).cast_signed(), 3.0);
-    let corrected = bench.rest(20).expect("it is called otherwise");
+    let corrected = bench.rest(20).expect("its position is set anew");
     assert_eq!(
         (corrected.cause, corrected.position[HOMED]),
         (RestCause::Corrected, before_mm + 3.0)

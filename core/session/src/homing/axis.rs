@@ -23,7 +23,7 @@ pub enum Step {
     Latch,
     /// Goes on to the index pulse behind it, whose position counts instead.
     Index,
-    /// Is called otherwise.
+    /// Its position is set anew.
     Correct {
         /// What is added to its coordinate, mm.
         by_mm: f64,

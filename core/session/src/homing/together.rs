@@ -60,7 +60,7 @@ enum Phase {
     BackOff,
     /// All go slowly onto theirs.
     Latch,
-    /// Each is called otherwise.
+    /// The position of each is set anew.
     Correct,
     /// All go home.
     GoHome,
@@ -360,7 +360,7 @@ impl Together {
     pub fn after_rest(&mut self, rest: &Rest) -> Result<(), String> {
         match (self.phase, rest.cause) {
             (Phase::Correct, RestCause::Corrected) => {
-                // From here on the others are where they were, called otherwise or not yet.
+                // The others stand where they did, whether their position has been set anew yet or not.
                 self.open &= self.open - 1;
                 if self.open == 0 {
                     self.begin(Phase::GoHome, 0);
