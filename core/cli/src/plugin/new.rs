@@ -109,7 +109,7 @@ fn filled(text: &str, name: &str, kind: Kind, source: &Source) -> String {
             "NAME",
             "max_current_a = 6",
         ),
-        Kind::Driver => ("driver", "driver", "NAME", "# this one has none"),
+        Kind::Driver => ("driver", "driver", "NAME", "interface = \"eth0\""),
         Kind::Kinematics => ("kinematics", "kinematics", "core-xy", JOINTS),
     };
     text.replace(example, "NAME")

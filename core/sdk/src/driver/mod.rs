@@ -100,8 +100,8 @@ pub trait Driver: Send {
         false
     }
 
-    /// One fine period: sends `setpoint`, fills `feedback`, which it is given as it left it. Fine loop: no allocation, no lock,
-    /// bounded time.
+    /// One fine period: sends `setpoint` and fills `feedback`, which still holds what the driver wrote in the last period. Fine
+    /// loop: no allocation, no lock, bounded time.
     ///
     /// A lost frame is no failure: the old numbers go out again with their age, until the driver's patience is over and the joint
     /// is [`JointState::Lost`].

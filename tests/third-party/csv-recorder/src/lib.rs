@@ -9,11 +9,15 @@ tandem_sdk::options! {
     }
 }
 
-pub struct Recorder(Options, DriverContext, Vec<Setpoint>);
+pub struct Recorder {
+    file: String,
+    context: DriverContext,
+    sent: Vec<Setpoint>,
+}
 
-tandem_sdk::plugin!(driver "csv-recorder" = |options: &Options| {
-    Ok(Recorder(options.clone(), DriverContext::new(0, 0.0), Vec::with_capacity(100_000)))
-});
+tandem_sdk::plugin!(driver "csv-recorder" = |options: &Options| Ok(Recorder {
+    file: options.file.clone(), context: DriverContext::new(0, 0.0), sent: Vec::with_capacity(100_000),
+}));
 
 impl Driver for Recorder {
     fn describe(&self) -> DriverDescription {
@@ -21,27 +25,25 @@ impl Driver for Recorder {
     }
 
     fn open(&mut self, context: &DriverContext) -> Result<(), PluginError> {
-        self.1 = *context;
-        std::fs::write(&self.0.file, "").map_err(|e| PluginError::of_option("file", e.to_string()))
+        self.context = *context;
+        std::fs::write(&self.file, "").map_err(|e| PluginError::of_option("file", e.to_string()))
     }
 
     fn start(&mut self) -> Result<Attached, PluginError> {
-        Ok(Attached::at(self.1.start_position))
+        Ok(Attached::at(self.context.start_position))
     }
 
     fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback) -> Result<(), PluginError> {
-        feedback.follow(setpoint, self.1.joint_count as usize);
-        if self.2.len() < self.2.capacity() {
-            self.2.push(*setpoint); // within what is allocated: this runs on the fine loop
-        }
+        feedback.follow(setpoint, self.context.joint_count as usize);
+        self.sent.extend(Some(*setpoint).filter(|_| self.sent.len() < self.sent.capacity())); // allocates nothing
         Ok(())
     }
 
     fn quick_stop(&mut self) {}
 
     fn stop(&mut self) -> Result<(), PluginError> {
-        let row = |s: &Setpoint| format!("{},{:?}\n", s.tick, &s.position.0[..self.1.joint_count as usize]);
-        let written = std::fs::write(&self.0.file, self.2.iter().map(row).collect::<String>());
-        written.map_err(|error| PluginError::new(format!("{}: {error}", self.0.file)))
+        let row = |s: &Setpoint| format!("{},{:?}\n", s.tick, &s.position.0[..self.context.joint_count as usize]);
+        let written = std::fs::write(&self.file, self.sent.iter().map(row).collect::<String>());
+        written.map_err(|error| PluginError::new(format!("{}: {error}", self.file)))
     }
 }
