@@ -138,8 +138,8 @@ cases! {
     nobody_is_kept_out_by_contrast_size_or_the_want_of_a_mouse: ["access"];
 }
 
-/// What page and server may add to the command, bytes.
-const MOST_ADDED: u64 = 3_000_000;
+/// What page and server may add to the command.
+const MAX_ADDED_BYTES: u64 = 3_000_000;
 
 /// Two builds of a release take minutes: `TANDEM_BINARY=1` asks for them.
 #[test]
@@ -174,7 +174,7 @@ fn the_command_is_hardly_larger_with_the_page() {
     let with = size("ethercat,scripts,web");
     println!("{with} bytes with the page, {without} without");
     assert!(
-        with <= without + MOST_ADDED,
+        with <= without + MAX_ADDED_BYTES,
         "{} bytes more",
         with - without
     );

@@ -23,7 +23,7 @@ const FEW_BLOCKS: u32 = 12;
 const MANY_BLOCKS: u32 = 60;
 /// Program time that the planner is asked for at once, s, and calls without any after which it is stuck.
 const PART_S: f64 = 0.1;
-const MOST_IDLE: u32 = 4;
+const MAX_IDLE_CALLS: u32 = 4;
 /// Where the polygons lie for the fit: as far as they need.
 const ROOM_MM: f64 = 1e5;
 
@@ -273,7 +273,7 @@ fn durations(planner: &mut dyn Planner, blocks: &[Block]) -> Result<Vec<f64>, St
         } else {
             idle + 1
         };
-        if idle > MOST_IDLE {
+        if idle > MAX_IDLE_CALLS {
             return Err("the planner does not get on".to_string());
         }
     }
@@ -296,7 +296,7 @@ impl SegmentSink for Taken {
 const WIDEST: f64 = 400.0;
 /// Steps of a fit, and the share by which a probe changes a constant. Planning on a grid makes times a little rough, so that a
 /// smaller one finds roughness.
-const MOST_STEPS: u32 = 8;
+const MAX_STEPS: u32 = 8;
 const PROBE: f64 = 0.03;
 /// Share by which the sum of the squares is to fall for another step, and for constants of each axis to be worth their number.
 const WORTH: f64 = 1e-2;
@@ -518,7 +518,7 @@ impl Fit<'_> {
         };
         let square = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>();
         let mut damping = 1e-2;
-        'steps: for _ in 0..MOST_STEPS {
+        'steps: for _ in 0..MAX_STEPS {
             let mut jacobian = DMatrix::zeros(here.len(), logs.len());
             for index in 0..logs.len() {
                 let mut moved = logs.clone();

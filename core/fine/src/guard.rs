@@ -20,20 +20,20 @@ const FITTED_MM: f64 = 1e-8;
 #[derive(Debug)]
 pub struct Guard {
     config: FineConfig,
-    lanes: [Lane; MAX_AXES],
+    bounds: [AxisBounds; MAX_AXES],
     position: AxisVector,
-    /// What is known behind the sample that was sent last, and behind the one judged last; which is which changes with each that
-    /// is sent, so that nothing is copied.
-    behind: [Behind; 2],
-    /// Index of what is known behind the one that was sent last.
+    /// The motion with the sample that was sent last, and with the one judged last; which is which changes with each that is
+    /// sent, so that nothing is copied.
+    last_motions: [LastMotion; 2],
+    /// Index of the motion with the one that was sent last.
     sent: usize,
     /// Samples for which jerk is not judged.
     relaxed: u32,
 }
 
-/// What a limit is with its tolerance, per entry: computed once.
+/// The limits of an axis or joint with their tolerances: computed once.
 #[derive(Clone, Copy, Debug)]
-struct Lane {
+struct AxisBounds {
     min_mm: f64,
     max_mm: f64,
     /// Change of velocity that the acceleration limit explains in a period, mm/s.
@@ -43,9 +43,9 @@ struct Lane {
     allowed_mm_per_s: f64,
 }
 
-/// Motion behind a sample, as the differences of samples show it.
+/// Velocity and acceleration with which a sample was reached, as the differences of samples show it.
 #[derive(Clone, Copy, Debug)]
-struct Behind {
+struct LastMotion {
     velocity: AxisVector,
     /// Zero where jerk is not judged.
     acceleration: AxisVector,
@@ -53,7 +53,7 @@ struct Behind {
     buckets: [[f64; MAX_AXES]; 2],
 }
 
-impl Behind {
+impl LastMotion {
     const REST: Self = Self {
         velocity: AxisVector::ZERO,
         acceleration: AxisVector::ZERO,
@@ -73,9 +73,9 @@ pub struct Checked {
 impl Guard {
     /// At rest at the configured position.
     pub fn new(config: &FineConfig) -> Self {
-        let lanes = std::array::from_fn(|axis| {
+        let bounds = std::array::from_fn(|axis| {
             let limits = &config.limits.axes[axis];
-            Lane {
+            AxisBounds {
                 min_mm: limits.min_mm,
                 max_mm: limits.max_mm,
                 leak_mm_per_s: limits.acceleration_mm_per_s2 * (1.0 + TOLERANCE) * config.period_s,
@@ -86,9 +86,9 @@ impl Guard {
         });
         Self {
             config: *config,
-            lanes,
+            bounds,
             position: config.position,
-            behind: [Behind::REST; 2],
+            last_motions: [LastMotion::REST; 2],
             sent: 0,
             relaxed: 0,
         }
@@ -101,12 +101,12 @@ impl Guard {
 
     /// The velocity of the last period, mm/s.
     pub fn velocity(&self) -> &AxisVector {
-        &self.behind[self.sent].velocity
+        &self.last_motions[self.sent].velocity
     }
 
     /// The acceleration of the last period, mm/s².
     pub fn acceleration(&self) -> &AxisVector {
-        &self.behind[self.sent].acceleration
+        &self.last_motions[self.sent].acceleration
     }
 
     /// No rate is known that keeps the jerk limit with the next sample: where it does not, that is not held against it.
@@ -114,7 +114,7 @@ impl Guard {
         self.relaxed = RELAXED_SAMPLES;
     }
 
-    /// Calls the place where the machine rests otherwise: `by` is added to the last position sent.
+    /// The position at which the machine rests is set anew: `by` is added to the last one sent.
     pub fn correct(&mut self, by: &AxisVector) {
         self.position += *by;
     }
@@ -158,8 +158,12 @@ impl Guard {
         travels: bool,
         relaxed: &mut bool,
     ) -> Option<FaultKind> {
-        let (lane, period_s, at) = (&self.lanes[axis], self.config.period_s, self.position[axis]);
-        let [first, second] = &mut self.behind;
+        let (bounds, period_s, at) = (
+            &self.bounds[axis],
+            self.config.period_s,
+            self.position[axis],
+        );
+        let [first, second] = &mut self.last_motions;
         let (last, now) = if self.sent == 0 {
             (first, second)
         } else {
@@ -169,16 +173,16 @@ impl Guard {
         let rounding = rounding(next, period_s);
         let velocity = (next - at) / period_s;
         let change = velocity - last.velocity[axis];
-        let leak = lane.leak_mm_per_s + rounding;
+        let leak = bounds.leak_mm_per_s + rounding;
         let up = larger(last.buckets[0][axis] + change - leak, 0.0);
         let down = larger(last.buckets[1][axis] - change - leak, 0.0);
         (now.velocity[axis], now.acceleration[axis]) = (velocity, 0.0);
         (now.buckets[0][axis], now.buckets[1][axis]) = (up, down);
         // What is true nearly always is looked at first; what is no number is within nothing.
         let forgiven = FITTED_MM + rounding;
-        let within = next >= lane.min_mm - forgiven && next <= lane.max_mm + forgiven;
-        let slow = velocity.abs() <= lane.fastest_mm_per_s + rounding;
-        let even = larger(up, down) <= lane.allowed_mm_per_s + rounding;
+        let within = next >= bounds.min_mm - forgiven && next <= bounds.max_mm + forgiven;
+        let slow = velocity.abs() <= bounds.fastest_mm_per_s + rounding;
+        let even = larger(up, down) <= bounds.allowed_mm_per_s + rounding;
         if !(next.abs() < f64::INFINITY && within && slow && even)
             && let Some(breach) = self.breach_of(axis, next, travels, velocity, change)
         {
@@ -190,6 +194,7 @@ impl Guard {
             None
         }
     }
+
     /// The limit that `next` breaks, where it does.
     #[cold]
     #[inline(never)]
@@ -201,9 +206,9 @@ impl Guard {
         velocity: f64,
         change: f64,
     ) -> Option<FaultKind> {
-        let (limits, lane, period_s) = (
+        let (limits, bounds, period_s) = (
             &self.config.limits.axes[axis],
-            &self.lanes[axis],
+            &self.bounds[axis],
             self.config.period_s,
         );
         let rounding = rounding(next, period_s);
@@ -220,27 +225,27 @@ impl Guard {
         }
         // Who stands outside of the travel may go inward only.
         let (lowest, highest) = (
-            lane.min_mm.min(self.position[axis]),
-            lane.max_mm.max(self.position[axis]),
+            bounds.min_mm.min(self.position[axis]),
+            bounds.max_mm.max(self.position[axis]),
         );
         let forgiven = FITTED_MM + rounding;
         if travels && (next < lowest - forgiven || next > highest + forgiven) {
             let nearest = if next < lowest {
-                lane.min_mm
+                bounds.min_mm
             } else {
-                lane.max_mm
+                bounds.max_mm
             };
             return breach(Breach::Position, next, nearest);
         }
-        if velocity.abs() > lane.fastest_mm_per_s + rounding {
+        if velocity.abs() > bounds.fastest_mm_per_s + rounding {
             return breach(
                 Breach::Velocity,
                 velocity,
                 limits.feed_mm_per_s.max(limits.rapid_mm_per_s),
             );
         }
-        let buckets = &self.behind[1 - self.sent].buckets;
-        if larger(buckets[0][axis], buckets[1][axis]) > lane.allowed_mm_per_s + rounding {
+        let buckets = &self.last_motions[1 - self.sent].buckets;
+        if larger(buckets[0][axis], buckets[1][axis]) > bounds.allowed_mm_per_s + rounding {
             return breach(
                 Breach::Acceleration,
                 change / period_s,
@@ -262,8 +267,8 @@ impl Guard {
             self.config.limits.axes[axis].jerk_mm_per_s3,
             self.config.period_s,
         );
-        self.behind[1 - self.sent].acceleration[axis] = acceleration;
-        let value = (acceleration - self.behind[self.sent].acceleration[axis]) / period_s;
+        self.last_motions[1 - self.sent].acceleration[axis] = acceleration;
+        let value = (acceleration - self.last_motions[self.sent].acceleration[axis]) / period_s;
         let beyond =
             value.abs() > limit * (1.0 + JERK_TOLERANCE) + 4.0 * rounding / (period_s * period_s);
         *relaxed |= beyond && self.relaxed > 0;
@@ -477,8 +482,8 @@ mod tests {
                 (tempted.velocity(), tempted.acceleration())
             );
             assert_eq!(
-                plain.behind[plain.sent].buckets,
-                tempted.behind[tempted.sent].buckets
+                plain.last_motions[plain.sent].buckets,
+                tempted.last_motions[tempted.sent].buckets
             );
         }
         assert!(refused > 30, "{refused}");

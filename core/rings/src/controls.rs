@@ -44,7 +44,7 @@ pub struct Controls {
     /// A fault found on the soft side (a plugin, the interpreter): stop on the path, then fault. Sticky.
     pub soft_fault: AtomicBool,
     /// The drives of a machine that stays are to let go between two jobs, at the rest where it stands.
-    pub let_go: AtomicBool,
+    pub drives_let_go: AtomicBool,
     /// The jog that moves.
     pub jog: JogControls,
 }
@@ -62,7 +62,7 @@ impl Default for Controls {
             abort: AtomicBool::new(false),
             reload_policy: AtomicBool::new(false),
             soft_fault: AtomicBool::new(false),
-            let_go: AtomicBool::new(false),
+            drives_let_go: AtomicBool::new(false),
             jog: JogControls::default(),
         }
     }

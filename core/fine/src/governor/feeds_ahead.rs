@@ -29,7 +29,7 @@ const FASTER: f64 = 0.1;
 /// Share of what passes in a period at the ratio asked for that such a piece is long at least.
 const SHORTEST_PERIODS: f64 = 0.125;
 /// Lowest ratio that is told from none there: pieces get on.
-const LEAST_RATIO: f64 = 1e-3;
+const MIN_RATIO: f64 = 1e-3;
 /// w of the highest rate.
 const MOST: f64 = 0.5;
 
@@ -90,7 +90,7 @@ impl Governor {
         let feeds = Feeds { ratio, period_s };
         while let Some((segment, from_s)) = place.segment().filter(|_| count < PIECES) {
             let longest_s = (LONGER * offset_s).max(self.period_s);
-            let shortest_s = SHORTEST_PERIODS * ratio.clamp(LEAST_RATIO, 1.0) * self.period_s;
+            let shortest_s = SHORTEST_PERIODS * ratio.clamp(MIN_RATIO, 1.0) * self.period_s;
             let piece_s = place.stretch_s(
                 longest_s.min(feeds.changing_s(segment, from_s, longest_s).max(shortest_s)),
             );

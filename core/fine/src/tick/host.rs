@@ -59,7 +59,7 @@ impl FineLoop {
     }
 
     /// The drives stay enabled when the program has ended, and are told to stay where they are, until somebody says that
-    /// they are to let go ([`tandem_rings::Controls::let_go`]). Host, before the first tick.
+    /// they are to let go ([`tandem_rings::Controls::drives_let_go`]). Host, before the first tick.
     pub fn stay(&mut self) {
         self.release.stay();
     }

@@ -128,7 +128,7 @@ impl Operator {
 
     /// Whether the drives are to let go though another job may follow.
     pub(super) fn lets_drives_go(&self) -> bool {
-        self.controls.let_go.load(Relaxed)
+        self.controls.drives_let_go.load(Relaxed)
     }
 
     /// The abort has been carried out: neither it nor a hold is left. A jog that is let go stays so.
@@ -230,7 +230,7 @@ mod tests {
         assert!(!operator.is_held() && !operator.inputs().abort && operator.is_jog_let_go());
         operator.press_emergency_stop();
         assert!(operator.inputs().emergency_stop && !operator.lets_drives_go());
-        controls.let_go.store(true, Relaxed);
+        controls.drives_let_go.store(true, Relaxed);
         assert!(operator.lets_drives_go());
     }
 }

@@ -394,7 +394,7 @@ impl<'r> Resident<'r> {
             self.attach_again(gone)?;
         }
         let job = self.source("enabling", Box::new(Nothing), switches)?;
-        self.controls.let_go.store(false, Relaxed);
+        self.controls.drives_let_go.store(false, Relaxed);
         let outcome = self.drive_with(job, resets, observer)?;
         self.enabled = outcome.fault.is_none() && !outcome.aborted;
         Ok(outcome)
@@ -644,7 +644,7 @@ impl<'r> Resident<'r> {
     /// [`Resident::idle`] in between. Host.
     pub fn disable(&mut self) -> bool {
         self.enabled = false;
-        self.controls.let_go.store(true, Relaxed);
+        self.controls.drives_let_go.store(true, Relaxed);
         self.engine.is_released()
     }
 

@@ -10,7 +10,7 @@ use super::rates::Interval;
 /// Longest part that is drawn as one polynomial, s.
 const LONGEST_S: f64 = 0.004;
 /// Most parts of one interval: at next to no rate they are longer.
-const MOST_PARTS: f64 = 1000.0;
+const MAX_PARTS: f64 = 1000.0;
 
 /// A stretch of the segment `from` that begins at its local time `begins_s`, whose rate goes from `rates[0]` to `rates[1]`.
 pub struct Stretch<'a> {
@@ -99,7 +99,7 @@ pub fn stretch(
     } = stretch;
     let all_s = 2.0 * interval.duration_s / (rates[0] + rates[1]);
     let change = (rates[1] - rates[0]) / all_s;
-    let parts = (all_s / LONGEST_S).ceil().clamp(1.0, MOST_PARTS);
+    let parts = (all_s / LONGEST_S).ceil().clamp(1.0, MAX_PARTS);
     let (h, count) = (all_s / parts, axes.count() + space.count());
     let at = |t_s: f64| {
         let rate = rates[0] + change * t_s;

@@ -32,7 +32,7 @@ use rates::Interval;
 const INTERVAL_S: f64 = 0.001;
 /// Program time that is looked at ahead, s, and the most where that does not settle anything.
 const AHEAD_S: f64 = 1.5;
-const MOST_AHEAD_S: f64 = 12.0;
+const MAX_AHEAD_S: f64 = 12.0;
 /// A block that lasts as long is long, however much longer it lasts.
 const LONG_BLOCK_S: f64 = 0.1;
 /// Rates that differ from 1 by less are 1.
@@ -140,11 +140,11 @@ impl CurvedJoints {
                 self.settled.extend(&self.rests[..=settled]);
             } else if self.done || !enough {
                 return Ok(false);
-            } else if more && self.look_s < MOST_AHEAD_S {
+            } else if more && self.look_s < MAX_AHEAD_S {
                 self.look_s *= 2.0;
             } else {
                 // A stop takes longer than what is looked at. The plan has one ready, and goes on with it for a while.
-                self.look_s = (2.0 * self.look_s).min(MOST_AHEAD_S);
+                self.look_s = (2.0 * self.look_s).min(MAX_AHEAD_S);
                 let first = self.whole_segments(self.rests.len() / 2);
                 self.settled.extend(&self.rests[..=first]);
                 return Ok(first > 0);

@@ -13,7 +13,7 @@
 use super::point::Point;
 
 /// Bounds on u from one side: two for each of two ends of an interval and each entry, and one for where w has to go.
-const MOST_LINES: usize = 4 * tandem_sdk::MAX_AXES + 1;
+const MAX_LINES: usize = 4 * tandem_sdk::MAX_AXES + 1;
 /// A segment has the lead over the continuous velocity as a straight line in time. Where u is not 0 the lead is none, and its rate is
 /// off by up to this many times `takeback·u` the program time of the segment.
 const LEAD_SHARE: f64 = 1.5;
@@ -42,14 +42,14 @@ type Line = (f64, f64);
 
 /// Lines of one side: how many, and which.
 struct Lines {
-    all: [Line; MOST_LINES],
+    all: [Line; MAX_LINES],
     count: usize,
 }
 
 impl Lines {
     fn new() -> Self {
         Self {
-            all: [(0.0, 0.0); MOST_LINES],
+            all: [(0.0, 0.0); MAX_LINES],
             count: 0,
         }
     }
