@@ -124,16 +124,10 @@ fn the_published_junction_feeds_are_in_the_blocks_file() {
     let done = Scenario::of(&example("two-step-arcs.ngc"))
         .on(&loop_machine)
         .run();
-    let mut reader = csv::Reader::from_path(done.file("blocks.csv")).unwrap();
-    let column = reader
-        .headers()
-        .unwrap()
+    let feeds: Vec<f64> = done
+        .block_cells("start_feed_mm_s")
         .iter()
-        .position(|h| h == "start_feed_mm_s")
-        .unwrap();
-    let feeds: Vec<f64> = reader
-        .records()
-        .map(|r| r.unwrap()[column].parse::<f64>().unwrap() * 60.0)
+        .map(|cell| cell.parse::<f64>().unwrap() * 60.0)
         .collect();
     for (block, feed) in [
         (1, 100.0),

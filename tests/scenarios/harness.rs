@@ -210,17 +210,12 @@ impl Done {
 
     /// A column of the trace as text.
     pub fn cells(&self, name: &str) -> Vec<String> {
-        let mut reader = csv::Reader::from_path(self.file("trace.csv")).unwrap();
-        let index = reader
-            .headers()
-            .unwrap()
-            .iter()
-            .position(|h| h == name)
-            .unwrap();
-        reader
-            .records()
-            .map(|row| row.unwrap()[index].to_string())
-            .collect()
+        column(&self.file("trace.csv"), name)
+    }
+
+    /// A column of the blocks file as text.
+    pub fn block_cells(&self, name: &str) -> Vec<String> {
+        column(&self.file("blocks.csv"), name)
     }
 
     /// The oracle's verdict with the machine's own options, changed by `adjust`.
@@ -300,4 +295,43 @@ pub fn judge_trace(
         &machine,
         &options,
     )
+}
+
+/// A column of a CSV file as text.
+fn column(file: &Path, name: &str) -> Vec<String> {
+    let mut reader = csv::Reader::from_path(file).unwrap();
+    let headers = reader.headers().unwrap();
+    let index = headers.iter().position(|h| h == name).unwrap();
+    reader
+        .records()
+        .map(|row| row.unwrap()[index].to_string())
+        .collect()
+}
+
+/// The share of the time in motion in which `limit` binds, as the report `html` says it, percent.
+pub fn percent_binding(html: &str, limit: &str) -> f64 {
+    let after = html
+        .split("what binds, of the time in motion<td>")
+        .nth(1)
+        .unwrap();
+    let shares = after.split('<').next().unwrap();
+    let share = shares
+        .split(", ")
+        .find_map(|word| word.strip_prefix(limit))
+        .unwrap_or_else(|| panic!("{shares}"));
+    share.trim_end_matches('%').trim().parse().unwrap()
+}
+
+/// The command that takes lines of the operator: `tandem jog` or `tandem mdi` in `folder`, with a trace and pipes on all sides.
+pub fn operator_command(name: &str, folder: &Path, machine: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tandem"));
+    command
+        .current_dir(folder)
+        .args([name, "--trace", "trace.csv", "--machine"])
+        .arg(machine)
+        .args(arguments)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    command
 }

@@ -7,7 +7,7 @@ use std::process::{ChildStdin, Command, Stdio};
 use serde_json::Value;
 use tandem_oracle::{Check, Machine, Options, Trace, judge};
 
-use crate::harness::{mill, root};
+use crate::harness::{mill, operator_command, root};
 use crate::keys::shell;
 use crate::operator::{Running, is_held, is_moving};
 
@@ -16,17 +16,7 @@ const ACCELERATION_MM_PER_S2: f64 = 1000.0;
 const PERIOD_S: f64 = 0.001;
 
 fn command(folder: &Path, machine: &Path, arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tandem"));
-    command
-        .current_dir(folder)
-        .args(["jog", "--trace", "trace.csv", "--machine"])
-        .arg(machine)
-        .args(arguments);
-    command
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped());
-    command
+    operator_command("jog", folder, machine, arguments)
 }
 
 /// What was said, and driven.

@@ -8,6 +8,8 @@ mod bad_input;
 #[cfg(feature = "nats")]
 mod batch_nats;
 mod bench;
+#[path = "../chromium.rs"]
+mod chromium;
 mod clients;
 mod clocks;
 mod defective;

@@ -2,27 +2,15 @@
 
 use std::io::Write;
 use std::path::Path;
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Child, Command, Output};
 
 use tempfile::TempDir;
 
-use crate::harness::{judge_trace, mill};
+use crate::harness::{judge_trace, mill, operator_command};
 use crate::operator::{Running, is_held, is_moving};
 
 fn command(folder: &Path, arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tandem"));
-    command
-        .current_dir(folder)
-        .arg("mdi")
-        .arg("--machine")
-        .arg(mill())
-        .args(["--trace", "trace.csv"])
-        .args(arguments);
-    command
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped());
-    command
+    operator_command("mdi", folder, &mill(), arguments)
 }
 
 struct Said {

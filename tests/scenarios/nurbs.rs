@@ -2,7 +2,7 @@
 
 use tandem_oracle::Check;
 
-use crate::harness::{Scenario, UNDISTURBED, root};
+use crate::harness::{Scenario, UNDISTURBED, percent_binding, root};
 
 const ADAPTIVE: [&str; 6] = [
     "--set",
@@ -318,26 +318,12 @@ fn the_report_shows_what_binds_along_a_curve() {
     assert_eq!(done.status(), 0, "{}", done.errors());
     let html = std::fs::read_to_string(&page).unwrap();
     assert!(html.contains("curvature of the curve") && html.contains("chord error on the curve"));
-    let words = html
-        .split("what binds, of the time in motion<td>")
-        .nth(1)
-        .unwrap()
-        .split('<')
-        .next()
-        .unwrap();
-    let share = |name: &str| {
-        let found = words
-            .split(", ")
-            .find_map(|word| word.strip_prefix(name))
-            .unwrap_or_else(|| panic!("{words}"));
-        found.trim_end_matches('%').trim().parse::<f64>().unwrap()
-    };
+    let [chord, acceleration, none] =
+        ["chord error", "acceleration", "none of these"].map(|limit| percent_binding(&html, limit));
     // The chord error holds the feed down along most of it; something binds nearly everywhere.
     assert!(
-        share("chord error") > 15.0
-            && share("acceleration") > 10.0
-            && share("none of these") < 30.0,
-        "{words}"
+        chord > 15.0 && acceleration > 10.0 && none < 30.0,
+        "{chord} {acceleration} {none}"
     );
     let plain = Scenario::text("F600 G1 X1\n")
         .on(&machine)

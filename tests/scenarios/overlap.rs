@@ -1,26 +1,11 @@
 //! The planner that lets blocks overlap, through the whole chain.
 
 use crate::examples::machine_of;
-use crate::harness::{Done, Scenario, overlapping, root};
+use crate::harness::{Scenario, overlapping, root};
 use crate::random::OVERLAP;
 
 fn program(path: &str) -> Scenario {
     Scenario::of(&root().join(path)).with(OVERLAP)
-}
-
-/// A column of the blocks file.
-fn blocks(done: &Done, name: &str) -> Vec<String> {
-    let mut reader = csv::Reader::from_path(done.file("blocks.csv")).unwrap();
-    let column = reader
-        .headers()
-        .unwrap()
-        .iter()
-        .position(|h| h == name)
-        .unwrap();
-    reader
-        .records()
-        .map(|row| row.unwrap()[column].to_string())
-        .collect()
 }
 
 #[test]
@@ -129,7 +114,8 @@ fn the_square_is_no_slower_than_with_exact_stops() {
         "{through_s} against {stopping_s}"
     );
     assert!(
-        blocks(&through, "limited_by")
+        through
+            .block_cells("limited_by")
             .iter()
             .any(|reason| reason == "tolerance")
     );
@@ -140,7 +126,7 @@ fn the_reason_is_what_cut_the_overlap() {
     let reasons = |text: &str, set: &[&str]| {
         let done = Scenario::text(text).with(OVERLAP).with(set).run();
         assert_eq!(done.status(), 0, "{}", done.errors());
-        (done.number("motion_time_s"), blocks(&done, "limited_by"))
+        (done.number("motion_time_s"), done.block_cells("limited_by"))
     };
     let square = |p: f64| format!("G21 G90\nG64 P{p}\nF5000\nG1 X20\nG1 Y20\nG1 X0\nG1 Y0\nM2\n");
     let wide = [0.5, 2.0, 10.0].map(|p| reasons(&square(p), &[]));
@@ -215,7 +201,7 @@ fn without_corner_control_the_constant_is_the_programs() {
         .with(&["--set", "planner.options.corner_control=off"])
         .run();
     assert_eq!(done.status(), 0, "{}", done.errors());
-    let constants = blocks(&done, "time_constant_ms");
+    let constants = done.block_cells("time_constant_ms");
     let constants: Vec<f64> = constants.iter().filter_map(|ms| ms.parse().ok()).collect();
     assert_eq!(constants.len(), 4, "the end of the program has none");
     assert!(
@@ -274,7 +260,7 @@ fn the_tolerance_holds_where_the_axes_do_not_count() {
         let overlaps = vertex_mm > 0.3 * tolerance;
         assert_eq!(overlaps, tolerance > 0.04, "{vertex_mm} of {tolerance} mm");
         assert_eq!(
-            blocks(&done, "limited_by")[0],
+            done.block_cells("limited_by")[0],
             if overlaps { "feed" } else { "tolerance" }
         );
     }

@@ -1,11 +1,9 @@
 //! The report of a real run, opened in a real browser.
 
-use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 
-use crate::harness::{Scenario, root};
-
-const BROWSER: &str = "/usr/bin/chromium";
+use crate::chromium;
+use crate::harness::{Scenario, percent_binding, root};
 
 #[test]
 fn the_report_opens_in_a_browser() {
@@ -23,28 +21,10 @@ fn the_report_opens_in_a_browser() {
         !own.contains("http://") && !own.contains("https://"),
         "the page fetches something"
     );
-    if !Path::new(BROWSER).exists() {
-        println!("skipped: chromium is not installed (apt-get install chromium)");
+    if chromium::is_missing() {
         return;
     }
-    let shown = Command::new(BROWSER)
-        .args([
-            "--headless",
-            "--no-sandbox",
-            "--disable-gpu",
-            "--no-first-run",
-            "--disable-background-networking",
-        ])
-        .args([
-            "--disable-component-update",
-            "--disable-sync",
-            "--window-size=1280,900",
-            "--virtual-time-budget=8000",
-        ])
-        .arg(format!(
-            "--user-data-dir={}",
-            folder.path().join("profile").display()
-        ))
+    let shown = chromium::headless(&folder.path().join("profile"), 8000)
         .arg("--dump-dom")
         .arg(format!("file://{path}"))
         .stdin(Stdio::null())
@@ -71,24 +51,12 @@ fn report_and_summary_say_what_binds_and_what_planning_took() {
         .with(&["--report", &path])
         .run();
     let html = std::fs::read_to_string(&page).unwrap();
-    let words = html
-        .split("what binds, of the time in motion<td>")
-        .nth(1)
-        .unwrap()
-        .split('<')
-        .next()
-        .unwrap();
-    let percent = |name: &str| {
-        let share = words
-            .split(", ")
-            .find_map(|word| word.strip_prefix(name))
-            .unwrap_or_else(|| panic!("{words}"));
-        share.trim_end_matches('%').trim().parse::<f64>().unwrap()
-    };
+    let [feed, jerk, tolerance] =
+        ["feed", "jerk", "tolerance"].map(|limit| percent_binding(&html, limit));
     // The long straights and the wide arc are driven at the feed, the rest at the jerk limit.
     assert!(
-        percent("feed") > 60.0 && percent("jerk") > 10.0 && percent("tolerance") > 0.0,
-        "{words}"
+        feed > 60.0 && jerk > 10.0 && tolerance > 0.0,
+        "{feed} {jerk} {tolerance}"
     );
     let seconds = |by: &str| done.summary()["limited_by_s"][by].as_f64().unwrap();
     assert!(

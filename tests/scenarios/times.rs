@@ -25,17 +25,8 @@ fn run(program: &str, (planner, machine): &(&str, PathBuf), commands: &str) -> D
 }
 
 fn times_of_blocks(done: &Done) -> Vec<f64> {
-    let mut reader = csv::Reader::from_path(done.file("blocks.csv")).unwrap();
-    let column = reader
-        .headers()
-        .unwrap()
-        .iter()
-        .position(|name| name == "time_s")
-        .unwrap();
-    reader
-        .records()
-        .map(|row| row.unwrap()[column].parse().unwrap())
-        .collect()
+    let cells = done.block_cells("time_s");
+    cells.iter().map(|cell| cell.parse().unwrap()).collect()
 }
 
 /// A circle of short chords, blocks shorter than a period, a dwell, a rapid.

@@ -1,5 +1,7 @@
 //! Opens a report in a real browser: it draws, and its script raises no error.
 
+#[path = "../../../tests/chromium.rs"]
+mod chromium;
 #[path = "../examples/demo/run.rs"]
 mod run;
 
@@ -7,18 +9,17 @@ use std::collections::HashSet;
 use std::fs::{self, File};
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::thread;
 use std::time::{Duration, Instant};
 
 use tandem_report::{Axis, Ended, Report, Samples, Unit};
 
-const CHROMIUM: &str = "/usr/bin/chromium";
 const PATIENCE: Duration = Duration::from_mins(2);
 
 #[test]
 fn a_report_draws_without_errors() {
-    if chromium_is_missing() {
+    if chromium::is_missing() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
@@ -47,7 +48,7 @@ fn a_report_draws_without_errors() {
 
 #[test]
 fn a_run_with_little_to_show_draws() {
-    if chromium_is_missing() {
+    if chromium::is_missing() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
@@ -126,7 +127,7 @@ fn the_strip_says_that_a_run_ended_in_a_fault_and_is_green_only_where_nothing_is
 /// What the page shows where a script types into it and looks at it.
 #[test]
 fn a_line_that_is_not_there_is_answered_and_names_of_what_binds_do_not_overlap() {
-    if chromium_is_missing() {
+    if chromium::is_missing() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
@@ -204,7 +205,7 @@ fn a_line_that_is_not_there_is_answered_and_names_of_what_binds_do_not_overlap()
 
 #[test]
 fn a_damaged_report_says_so() {
-    if chromium_is_missing() {
+    if chromium::is_missing() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
@@ -252,14 +253,6 @@ fn lathe(n: usize) -> Report {
     }
 }
 
-fn chromium_is_missing() -> bool {
-    let missing = !Path::new(CHROMIUM).exists();
-    if missing {
-        println!("skipped: chromium is not installed (apt-get install chromium)");
-    }
-    missing
-}
-
 fn root_of(dom: &str) -> &str {
     dom.lines()
         .find(|line| line.starts_with("<html"))
@@ -279,21 +272,7 @@ fn assert_ready(dom: &str) {
 fn browse(folder: &Path, options: &[&str], address: &str) -> String {
     let profile = tempfile::tempdir_in(folder).unwrap();
     let output: PathBuf = profile.path().join("output");
-    let mut browser = Command::new(CHROMIUM)
-        .args([
-            "--headless",
-            "--no-sandbox",
-            "--disable-gpu",
-            "--no-first-run",
-            "--disable-background-networking",
-        ])
-        .args([
-            "--disable-component-update",
-            "--disable-sync",
-            "--window-size=1280,900",
-            "--virtual-time-budget=5000",
-        ])
-        .arg(format!("--user-data-dir={}", profile.path().display()))
+    let mut browser = chromium::headless(profile.path(), 5000)
         .args(options)
         .arg(address)
         .stdin(Stdio::null())
