@@ -13,7 +13,10 @@
 //!
 //! It looks back over up to 96 pieces of the queued plan.
 
-use super::tuning::FEEDS_AHEAD_LIMIT_SHARE;
+use super::tuning::{
+    FEEDS_AHEAD_LIMIT_SHARE, FEEDS_AHEAD_MIN_PERIODS, FEEDS_AHEAD_MIN_RATIO,
+    FEEDS_AHEAD_PIECE_SHARE, FEEDS_AHEAD_SPEED_SHARE,
+};
 use tandem_sdk::{Segment, SegmentFlags, derivatives};
 
 use super::{Governor, TOLERANCE};
@@ -22,14 +25,6 @@ use crate::plan_ahead::PlanCursor;
 
 /// Pieces that are laid out: in long segments they reach over 900 periods, longer than most machines take to their feed.
 const PIECES: usize = 96;
-/// Share of its distance by which a piece may be long; one period at least.
-const LONGER: f64 = 0.05;
-/// Share by which the path speed changes in a piece where it is beyond the feed.
-const FASTER: f64 = 0.1;
-/// Share of what passes in a period at the ratio asked for that such a piece is long at least.
-const SHORTEST_PERIODS: f64 = 0.125;
-/// Lowest ratio that is told from none there: pieces get on.
-const MIN_RATIO: f64 = 1e-3;
 /// w of the highest rate.
 const MOST: f64 = 0.5;
 
@@ -89,8 +84,9 @@ impl Governor {
         let period_s = self.period_s;
         let feeds = Feeds { ratio, period_s };
         while let Some((segment, from_s)) = place.segment().filter(|_| count < PIECES) {
-            let longest_s = (LONGER * offset_s).max(self.period_s);
-            let shortest_s = SHORTEST_PERIODS * ratio.clamp(MIN_RATIO, 1.0) * self.period_s;
+            let longest_s = (FEEDS_AHEAD_PIECE_SHARE * offset_s).max(self.period_s);
+            let shortest_s =
+                FEEDS_AHEAD_MIN_PERIODS * ratio.clamp(FEEDS_AHEAD_MIN_RATIO, 1.0) * self.period_s;
             let piece_s = place.stretch_s(
                 longest_s.min(feeds.changing_s(segment, from_s, longest_s).max(shortest_s)),
             );
@@ -191,7 +187,7 @@ impl Feeds {
             return f64::INFINITY;
         }
         let [speed, acceleration, _] = derivatives(&segment.path, from_s);
-        FASTER * speed.max(self.allowed_mm_per_s(segment)) / acceleration.abs()
+        FEEDS_AHEAD_SPEED_SHARE * speed.max(self.allowed_mm_per_s(segment)) / acceleration.abs()
     }
 
     /// What is allowed of w at both ends of a piece of `segment`: the line between them lies nowhere above what is at each place.

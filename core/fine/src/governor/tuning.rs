@@ -8,6 +8,19 @@ pub const ORDER2_LIMIT_SHARE: f64 = 0.999;
 /// to the next leaves less of both.
 pub const FEEDS_AHEAD_LIMIT_SHARE: f64 = 0.98;
 
+/// Order 2: longest piece of the plan in which slowing down for a feed ahead is laid out, as a share of its distance from here; one
+/// period at least.
+pub const FEEDS_AHEAD_PIECE_SHARE: f64 = 0.05;
+
+/// Order 2: share by which the path speed may change in such a piece where it is beyond the feed.
+pub const FEEDS_AHEAD_SPEED_SHARE: f64 = 0.1;
+
+/// Order 2: shortest of these pieces, as a share of the program time that passes in a period at the ratio asked for.
+pub const FEEDS_AHEAD_MIN_PERIODS: f64 = 0.125;
+
+/// Order 2: the ratio below which they get no shorter, without unit: at a ratio of nothing they get on too.
+pub const FEEDS_AHEAD_MIN_RATIO: f64 = 1e-3;
+
 /// Order 3: share of the limits of jerk and acceleration that approaches aim at; the rest covers what changes within a period.
 pub const ORDER3_LIMIT_SHARE: f64 = 0.995;
 
@@ -52,6 +65,9 @@ pub const FEED_WAY_LIMIT_SHARE: f64 = 0.95;
 /// Order 3: steps on such ways that are tried in a fine period, all together: the work of a period is bounded.
 pub const FEED_WAY_STEPS: u32 = 500;
 
+/// Order 3: share of the rate at which the plan keeps the feed everywhere that such a way is aimed at: it ends between the two.
+pub const FEED_WAY_LANDING_SHARE: f64 = 0.9;
+
 /// Order 3: share of the jerk that an approach counts on where the plan turns or changes its speed ahead.
 pub const APPROACH_JERK_SHARE: f64 = 0.8;
 
@@ -84,6 +100,22 @@ pub const BRAKING_PERIODS: f64 = 2.0;
 /// Order 3: fine periods at a lower feed by which it is to be reached before its place: the last of what a speed is above it is
 /// divided by three in each.
 pub const SETTLING_PERIODS: f64 = 10.0;
+
+/// Fine periods for which lower feeds are looked for beyond the longest stop: those in which what was seen is acted on.
+pub const SLOWDOWN_PERIODS: f64 = 4.0;
+
+/// Fine periods in which a stop has not begun to slow the machine: the one in which the queue is looked at, the one in which the rate
+/// is chosen, and the one in which it begins to fall.
+pub const REACTION_PERIODS: f64 = 3.0;
+
+/// Fine periods at the present speed by which the end of a line is looked for further than a stop takes.
+pub const LINE_END_LOOK_PERIODS: f64 = 3.0;
+
+/// How near to the end of its line the machine comes to rest, mm.
+pub const LINE_END_MM: f64 = 0.01;
+
+/// As near as this to the end of its line, mm, the machine comes to rest at once: it does not get faster again.
+pub const AT_LINE_END_MM: f64 = 0.001;
 
 /// Order 3: share of the path jerk that a stop at the end of a line counts on where the plan turns or changes its speed, and
 /// elsewhere. From 80 mm/s on a straight line the stop begins 3 % before it has to; with half of the second share 16 %,

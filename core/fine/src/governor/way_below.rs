@@ -11,8 +11,8 @@ use super::Aim;
 use super::interval::Interval;
 use super::keep_limits::{RateState, WaySearch, nearest_with_way};
 use super::tuning::{
-    FEED_POINT_MIN_RATE, FEED_POINT_SPACING, FEED_WAY_PERIODS, FEED_WAY_RAMPS,
-    FEED_WAY_SINGLE_PERIODS, FEED_WAY_STEPS, MAX_LOWERING,
+    FEED_POINT_MIN_RATE, FEED_POINT_SPACING, FEED_WAY_LANDING_SHARE, FEED_WAY_PERIODS,
+    FEED_WAY_RAMPS, FEED_WAY_SINGLE_PERIODS, FEED_WAY_STEPS, MAX_LOWERING,
 };
 use crate::horizon::Horizon;
 use crate::plan_ahead::{Pace, PlanCursor};
@@ -25,8 +25,6 @@ const PLACES: usize = 48;
 const BEGINNINGS: u32 = 5;
 /// How often the feed is looked at in a step of a way that lasts for as many periods or more.
 const LOOKS: u32 = 4;
-/// Share of the rate at which the plan keeps the feed everywhere that a way is aimed at: it ends between the two.
-const LANDING_SHARE: f64 = 0.9;
 /// Relative tolerance on the feed.
 const TOLERANCE: f64 = 1e-7;
 
@@ -286,7 +284,7 @@ impl Below<'_> {
                 steady
             } else {
                 // As low as leaves another such step to bring σ̇ to nothing.
-                let landing = LANDING_SHARE * self.kept_rate - sigma - 1.5 * step_s * rate;
+                let landing = FEED_WAY_LANDING_SHARE * self.kept_rate - sigma - 1.5 * step_s * rate;
                 (landing.max(-MAX_LOWERING) / (step_s * step_s)).min(steady)
             };
             let mut on = (&mut way, &mut watch);

@@ -2,8 +2,9 @@
 //! end of every line of the program.
 
 use crate::governor::tuning::{
-    ABOVE_FEED_SHARE, BEGINNING_PERIODS, BRAKING_JERK_SHARE, BRAKING_PERIODS, LINE_END_JERK_SHARES,
-    LONGER_MARGIN, MAX_LONGER, SETTLING_PERIODS,
+    ABOVE_FEED_SHARE, AT_LINE_END_MM, BEGINNING_PERIODS, BRAKING_JERK_SHARE, BRAKING_PERIODS,
+    LINE_END_JERK_SHARES, LINE_END_LOOK_PERIODS, LINE_END_MM, LONGER_MARGIN, MAX_LONGER,
+    SETTLING_PERIODS, SLOWDOWN_PERIODS,
 };
 use tandem_rings::STOP_SHARE;
 
@@ -106,22 +107,11 @@ struct Asked {
     rapid: bool,
 }
 
-/// Fine periods for which lower feeds are looked for beyond the longest stop: those in which what was seen is acted on.
-const SLOWDOWN_PERIODS: f64 = 4.0;
-
 /// Share of the path coordinate by which a difference of two of them is rounded.
 const ROUNDED_SHARE: f64 = 2.0 * f64::EPSILON;
 
 /// Share of the path coordinate that a period is to be long, so that its length is known to a millionth.
 const MIN_SHARE: f64 = 1e6 * f64::EPSILON;
-
-/// How near to the end of its line the machine comes to rest, mm.
-const LINE_END_MM: f64 = 0.01;
-/// As near as this to the end of its line, mm, the machine comes to rest at once: it does not get faster again.
-const AT_LINE_END_MM: f64 = 0.001;
-
-/// Fine periods at the present speed by which the end of a line is looked for further than a stop takes.
-const LINE_END_LOOK_PERIODS: f64 = 3.0;
 
 /// Rounds in which the rate of the first period from rest is sought: 1/2 of what is wrong is left by each.
 const REST_ROUNDS: u32 = 8;

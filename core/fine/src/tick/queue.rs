@@ -4,9 +4,7 @@ use std::sync::atomic::Ordering::Acquire;
 
 use tandem_rings::{Depth, STOP_SHARE};
 
-/// Fine periods in which a stop has not begun to slow the machine: the one in which the queue is looked at, the one in which the rate
-/// is chosen, and the one in which it begins to fall.
-const REACTION_PERIODS: f64 = 3.0;
+use crate::governor::tuning::REACTION_PERIODS;
 
 /// Starvation: the end of the queue is a wall unless it ends at rest, and the machine must be able to stop before.
 ///
