@@ -164,25 +164,19 @@ fn joints_are_axes(machine: &Machine) -> bool {
 /// The experiment, and what each of its lines is for.
 fn program(machine: &Machine, motor: &Motor) -> Result<(String, Vec<Purpose>), String> {
     let limits = &machine.limits.axes()[motor.index];
-    let (middle, room) = (
-        f64::midpoint(limits.min_mm, limits.max_mm),
-        0.9 * (limits.max_mm - limits.min_mm),
-    );
+    let middle = f64::midpoint(limits.min_mm, limits.max_mm);
+    let room = 0.9 * (limits.max_mm - limits.min_mm);
     if !(middle.is_finite() && room > 0.0) {
         return Err(format!(
             "axis {}: it states no travel to move in",
             motor.letter
         ));
     }
-    let (mut text, mut purposes) = (
-        "G21 G90 G94 G61\n".to_string(),
-        vec![Purpose::Positioning; 2],
-    );
+    let mut text = "G21 G90 G94 G61\n".to_string();
+    let mut purposes = vec![Purpose::Positioning; 2];
     let mut line = |place_mm: f64, mm_per_s: Option<f64>, purpose: Purpose| {
-        let (letter, feed) = (
-            motor.letter.to_ascii_uppercase(),
-            mm_per_s.map(|v| v * 60.0),
-        );
+        let letter = motor.letter.to_ascii_uppercase();
+        let feed = mm_per_s.map(|v| v * 60.0);
         let _ = match feed {
             Some(feed) => writeln!(text, "G1 {letter}{place_mm:.6} F{feed:.6}"),
             None => writeln!(text, "G0 {letter}{place_mm:.6}"),

@@ -94,10 +94,8 @@ fn state(sample: &Sample) -> String {
     let rpm = |rad_per_s: f64| rad_per_s.abs() * 30.0 / PI;
     match sample.cause {
         StopCause::Spindle => {
-            let (turns, told) = (
-                rpm(sample.spindle_rad_per_s),
-                rpm(sample.switched.spindle_rad_per_s),
-            );
+            let turns = rpm(sample.spindle_rad_per_s);
+            let told = rpm(sample.switched.spindle_rad_per_s);
             format!("waits for the spindle: {turns:.0} of {told:.0} rpm")
         }
         _ => sample.state.name().to_string(),

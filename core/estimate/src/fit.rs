@@ -116,7 +116,9 @@ pub fn positive_parameters<const N: usize>(
         let there = residuals(&exp(&next));
         let (before, after) = (square(&here), square(&there));
         if after < before {
-            (logs, here, damping) = (next, there, damping / 3.0);
+            logs = next;
+            here = there;
+            damping = damping / 3.0;
             if after > before * (1.0 - WORTH) || after < 1e-18 {
                 break;
             }

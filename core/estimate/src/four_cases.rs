@@ -19,10 +19,8 @@ pub struct Driven {
 
 /// Drives `length` with at most `feed` from `start` to `end` with the acceleration `a`, in any consistent units.
 pub fn drive(length: f64, feed: f64, start: f64, end: f64, a: f64) -> Driven {
-    let (up, down) = (
-        start * start + 2.0 * a * length,
-        start * start - 2.0 * a * length,
-    );
+    let up = start * start + 2.0 * a * length;
+    let down = start * start - 2.0 * a * length;
     if end * end > up {
         let peak = up.sqrt();
         return Driven {

@@ -549,7 +549,9 @@ impl Fit<'_> {
                 let before = square(&here);
                 if let Some(there) = there.filter(|there| square(there) < before) {
                     let after = square(&there);
-                    (logs, here, damping) = (next, there, damping / 5.0);
+                    logs = next;
+                    here = there;
+                    damping = damping / 5.0;
                     if after > before * (1.0 - WORTH) {
                         break 'steps;
                     }

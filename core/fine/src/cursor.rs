@@ -106,13 +106,13 @@ impl Cursor {
     /// Rests at `position` from here on, in the next epoch: older entries no longer count.
     pub fn end_epoch(&mut self, position: &AxisVector) {
         let mut rest = Segment::rest(position, 0.0);
-        (rest.block, rest.line, rest.feed_mm_per_s) = (
-            self.segment.block,
-            self.segment.line,
-            self.segment.feed_mm_per_s,
-        );
+        rest.block = self.segment.block;
+        rest.line = self.segment.line;
+        rest.feed_mm_per_s = self.segment.feed_mm_per_s;
         rest.path[0] = self.path_mm;
-        (self.start_s, self.local_s, self.owed_s) = (self.program_time_s(), 0.0, 0.0);
+        self.start_s = self.program_time_s();
+        self.local_s = 0.0;
+        self.owed_s = 0.0;
         self.segment = rest;
         self.resting = true;
         self.epoch += 1;
@@ -430,7 +430,9 @@ mod tests {
         let (mut input, output) = RingBuffer::new(8);
         for (line, epoch) in [(3, 0), (4, 1)] {
             let mut segment = Segment::rest(&AxisVector::ZERO, 1.0);
-            (segment.line, segment.epoch, segment.feed_mm_per_s) = (line, epoch, 10.0);
+            segment.line = line;
+            segment.epoch = epoch;
+            segment.feed_mm_per_s = 10.0;
             segment.stop_on.input = line;
             let start_s = 0.0;
             input.push(Queued::Segment { start_s, segment }).unwrap();

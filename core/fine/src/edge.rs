@@ -164,14 +164,12 @@ mod tests {
 
     fn probing(edge: Edge) -> Segment {
         let mut segment = Segment::rest(&AxisVector::ZERO, 1.0);
-        (segment.block, segment.stop_on) = (
-            7,
-            StopOn {
-                input: 3,
-                edge,
-                miss_is_fault: 0,
-            },
-        );
+        segment.block = 7;
+        segment.stop_on = StopOn {
+            input: 3,
+            edge,
+            miss_is_fault: 0,
+        };
         segment
     }
 

@@ -158,11 +158,9 @@ impl Guard {
         travels: bool,
         relaxed: &mut bool,
     ) -> Option<FaultKind> {
-        let (bounds, period_s, at) = (
-            &self.bounds[axis],
-            self.config.period_s,
-            self.position[axis],
-        );
+        let bounds = &self.bounds[axis];
+        let period_s = self.config.period_s;
+        let at = self.position[axis];
         let [first, second] = &mut self.last_motions;
         let (last, now) = if self.sent == 0 {
             (first, second)
@@ -206,11 +204,9 @@ impl Guard {
         velocity: f64,
         change: f64,
     ) -> Option<FaultKind> {
-        let (limits, bounds, period_s) = (
-            &self.config.limits.axes[axis],
-            &self.bounds[axis],
-            self.config.period_s,
-        );
+        let limits = &self.config.limits.axes[axis];
+        let bounds = &self.bounds[axis];
+        let period_s = self.config.period_s;
         let rounding = rounding(next, period_s);
         let breach = |breach, value, limit| {
             Some(FaultKind::Guard {
@@ -224,10 +220,8 @@ impl Guard {
             return breach(Breach::NotFinite, next, 0.0);
         }
         // Who stands outside of the travel may go inward only.
-        let (lowest, highest) = (
-            bounds.min_mm.min(self.position[axis]),
-            bounds.max_mm.max(self.position[axis]),
-        );
+        let lowest = bounds.min_mm.min(self.position[axis]);
+        let highest = bounds.max_mm.max(self.position[axis]);
         let forgiven = FITTED_MM + rounding;
         if travels && (next < lowest - forgiven || next > highest + forgiven) {
             let nearest = if next < lowest {
@@ -263,10 +257,8 @@ impl Guard {
         rounding: f64,
         relaxed: &mut bool,
     ) -> Option<FaultKind> {
-        let (limit, period_s) = (
-            self.config.limits.axes[axis].jerk_mm_per_s3,
-            self.config.period_s,
-        );
+        let limit = self.config.limits.axes[axis].jerk_mm_per_s3;
+        let period_s = self.config.period_s;
         self.last_motions[1 - self.sent].acceleration[axis] = acceleration;
         let value = (acceleration - self.last_motions[self.sent].acceleration[axis]) / period_s;
         let beyond =

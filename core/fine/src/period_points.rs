@@ -65,7 +65,9 @@ impl PeriodPoints {
     /// Forgets all points.
     pub fn clear(&mut self) {
         self.count = 0;
-        (self.speed_ratio, self.acceleration_ratio, self.covered_s) = (0.0, 0.0, 0.0);
+        self.speed_ratio = 0.0;
+        self.acceleration_ratio = 0.0;
+        self.covered_s = 0.0;
     }
 
     /// Collects where the plan goes within `horizon_s` of program time.

@@ -392,10 +392,8 @@ impl<'a> PlanCursor<'a> {
             let [velocity, acceleration, _] =
                 derivatives(&segment.coefficients[axis], self.local_s);
             pace.position[axis] = position[axis];
-            (squares, product) = (
-                squares + velocity * velocity,
-                product + velocity * acceleration,
-            );
+            squares += velocity * velocity;
+            product += velocity * acceleration;
         }
         if squares > speed * speed {
             (pace.speed, pace.rise) = (squares.sqrt(), product / squares.sqrt());

@@ -53,10 +53,8 @@ impl Steps {
 
     /// From the end of `before` to a rest there.
     pub fn to_rest(before: &Segment) -> Self {
-        let (velocity, acceleration) = (
-            before.velocity(before.duration_s),
-            before.acceleration(before.duration_s),
-        );
+        let velocity = before.velocity(before.duration_s);
+        let acceleration = before.acceleration(before.duration_s);
         Self {
             velocity: velocity.0.map(f64::abs),
             acceleration: acceleration.0.map(f64::abs),

@@ -306,10 +306,8 @@ fn axis(section: &Section<'_>, name: &str, set: &AxisSet, joints: &[Joint]) -> O
     } else {
         section.required(keys.switch, Section::number)
     };
-    let (per_minute, most) = (
-        keys.scale / 60.0,
-        set.limits.axes().get(axis)?.feed_mm_per_s,
-    );
+    let per_minute = keys.scale / 60.0;
+    let most = set.limits.axes().get(axis)?.feed_mm_per_s;
     for (key, feed) in [(keys.search, search), (keys.latch, latch)] {
         if feed.is_some_and(|feed| feed.abs() * per_minute > most * (1.0 + 1e-12)) {
             section.refuse(

@@ -75,10 +75,8 @@ pub(crate) fn read(root: &Section<'_>) -> Vec<Input> {
         let Some(input) = one(&table, name) else {
             continue;
         };
-        let (number, same) = (
-            input.input,
-            all.iter().find(|other| other.input == input.input),
-        );
+        let number = input.input;
+        let same = all.iter().find(|other| other.input == input.input);
         match same.filter(|other| {
             other.role == input.role || other.normally_closed != input.normally_closed
         }) {

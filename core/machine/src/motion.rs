@@ -138,10 +138,8 @@ impl Loops {
                 Some(default)
             }
         };
-        let (rough, fine) = (
-            period("rough_period_ms", 8.0),
-            period("fine_period_ms", 1.0),
-        );
+        let rough = period("rough_period_ms", 8.0);
+        let fine = period("fine_period_ms", 1.0);
         let count = rough
             .zip(fine)
             .and_then(|(rough, fine)| fine_periods(loops, rough, fine));

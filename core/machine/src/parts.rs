@@ -261,10 +261,8 @@ const AT_SPEED_RANGE_S: [f64; 2] = [0.1, 600.0];
 impl Spindle {
     /// Reads `[spindle]`.
     pub(crate) fn read(spindle: &Section<'_>) -> Self {
-        let (min, max) = (
-            spindle.at_least("min_rpm", 0.0).unwrap_or(0.0),
-            spindle.positive("max_rpm"),
-        );
+        let min = spindle.at_least("min_rpm", 0.0).unwrap_or(0.0);
+        let max = spindle.positive("max_rpm");
         if let Some(max) = max.filter(|max| *max < min) {
             spindle.refuse(
                 "min_rpm",

@@ -284,10 +284,8 @@ fn parameter(memory: &[u8], at: usize, utf16: bool) -> Result<Parameter, Refusal
     };
     let name = text(abi::parameter::NAME, abi::parameter::NAME_BYTES)?;
     let description = text(abi::parameter::TEXT, abi::parameter::TEXT_BYTES)?;
-    let (lowest, highest) = (
-        number(abi::parameter::LOWEST)?,
-        number(abi::parameter::HIGHEST)?,
-    );
+    let lowest = number(abi::parameter::LOWEST)?;
+    let highest = number(abi::parameter::HIGHEST)?;
     let default = number(abi::parameter::DEFAULT)?;
     if !is_name(&name) {
         return Err(wrong(format!(

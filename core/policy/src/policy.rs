@@ -198,7 +198,9 @@ impl Policy {
         }
         self.window.look_at(looks(&script, &instance));
         self.places = places;
-        (self.script, self.instance, self.strikes) = (script, Some(instance), 0);
+        self.script = script;
+        self.instance = Some(instance);
+        self.strikes = 0;
         self.counters.reloads += 1;
         self.notes
             .always("policy: the script is loaded anew".to_string());

@@ -135,7 +135,9 @@ mod tests {
             knots: vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0],
         };
         let mut block = Block::at(data.control_points[0]);
-        (block.kind, block.index, block.end) = (BlockKind::Nurbs, 3, data.control_points[2]);
+        block.kind = BlockKind::Nurbs;
+        block.index = 3;
+        block.end = data.control_points[2];
         let mut watch = CurveWatch::new(Axes::new(&[('X', false), ('Y', false)]).unwrap());
         watch.block(&block, Some(data.curve()));
         let sagitta_mm = 10.0 * (1.0 - 0.05f64.cos());

@@ -232,7 +232,9 @@ mod tests {
         let at = |n: u64| AxisVector::from_slice(&[0.1 * n as f64, 0.02 * (n % 3) as f64]);
         for index in 0..100 {
             let mut block = Block::at(at(index));
-            (block.kind, block.index, block.end) = (BlockKind::Line, index, at(index + 1));
+            block.kind = BlockKind::Line;
+            block.index = index;
+            block.end = at(index + 1);
             block.length_mm = axes.path_length(&(block.end - block.start));
             watch.block(&axes, &block, None);
         }

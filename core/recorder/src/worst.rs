@@ -23,11 +23,9 @@ pub struct Worst {
 impl Worst {
     /// Nothing seen.
     pub fn new(machine: &Machine) -> Self {
-        let (limits, axes, period_s) = (
-            machine.limits.axes,
-            machine.axes.count(),
-            machine.fine_period_s,
-        );
+        let limits = machine.limits.axes;
+        let axes = machine.axes.count();
+        let period_s = machine.fine_period_s;
         let (beyond, of_limits) = ([[0.0; 2]; MAX_AXES], [OfLimits::default(); MAX_AXES]);
         Self {
             limits,

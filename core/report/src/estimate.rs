@@ -114,10 +114,8 @@ fn cells(fields: &[EstimatedField], (x, y): (&Scale, &Scale), text: &mut String)
         .fold(f64::MIN_POSITIVE, f64::max);
     for field in fields {
         let (left, right) = (x.place(field.length_mm[0]), x.place(field.length_mm[1]));
-        let (bottom, top) = (
-            y.place(field.feed_mm_per_min[0]),
-            y.place(field.feed_mm_per_min[1]),
-        );
+        let bottom = y.place(field.feed_mm_per_min[0]);
+        let top = y.place(field.feed_mm_per_min[1]);
         let _ = write!(
             text,
             "<rect class=\"s0\" x=\"{left:.1}\" y=\"{top:.1}\" width=\"{:.1}\" height=\"{:.1}\" fill-opacity=\"{:.2}\">\

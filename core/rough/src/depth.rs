@@ -330,10 +330,8 @@ mod tests {
         let mut stops = vec![];
         for piece in 0..pieces {
             let phase = f64::from(piece) * 0.05;
-            let (speed, deceleration) = (
-                30.0 + 25.0 * phase.sin(),
-                100.0 * 10f64.powf((1.7 * phase).cos()),
-            );
+            let speed = 30.0 + 25.0 * phase.sin();
+            let deceleration = 100.0 * 10f64.powf((1.7 * phase).cos());
             depth.push(
                 &Segment {
                     duration_s: 0.002,

@@ -62,7 +62,9 @@ impl Plans for Pieces {
     }
 
     fn reset(&mut self, position: &AxisVector) {
-        (self.held, self.finished, self.path_mm) = (vec![], false, 0.0);
+        self.held = vec![];
+        self.finished = false;
+        self.path_mm = 0.0;
         self.resets.lock().unwrap().push(*position);
     }
 }

@@ -232,10 +232,8 @@ impl LinuxCnc<'_> {
             return Ok(());
         }
         if (SYSTEMS..SYSTEMS + OF_A_SYSTEM * WORK_SYSTEMS).contains(&number) {
-            let (system, nth) = (
-                (number - SYSTEMS) / OF_A_SYSTEM,
-                (number - SYSTEMS) % OF_A_SYSTEM,
-            );
+            let system = (number - SYSTEMS) / OF_A_SYSTEM;
+            let nth = (number - SYSTEMS) % OF_A_SYSTEM;
             if nth < LETTERS.len() {
                 return self.put(nth, value, &mut offsets.origins[system]);
             }

@@ -52,10 +52,8 @@ pub(crate) fn examine(connection: &Connection, path: &Path) -> Result<bool, Stat
     let reading = |error: rusqlite::Error| StateError::reading(path, &error);
     let number =
         |pragma: &str| connection.pragma_query_value(None, pragma, |row| row.get::<_, i64>(0));
-    let (application, format) = (
-        number("application_id").map_err(reading)?,
-        number("user_version").map_err(reading)?,
-    );
+    let application = number("application_id").map_err(reading)?;
+    let format = number("user_version").map_err(reading)?;
     let objects = "SELECT count(*) FROM sqlite_master";
     let objects = connection
         .query_row(objects, [], |row| row.get::<_, i64>(0))

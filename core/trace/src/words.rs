@@ -89,10 +89,8 @@ impl Shape {
                 .for_each(|value| *value = words_left.next().unwrap_or_default());
             values
         };
-        let (command, feedback) = (
-            take(self.axes).map(f64::from_bits),
-            take(self.axes).map(f64::from_bits),
-        );
+        let command = take(self.axes).map(f64::from_bits);
+        let feedback = take(self.axes).map(f64::from_bits);
         let [feed_mm_per_s, sigma, ratio, ..] = take(3).map(f64::from_bits);
         let [outputs, spindle, phase, ..] = if self.switched {
             take(SWITCHED_WORDS)

@@ -175,7 +175,9 @@ impl Bus {
         self.members = up.devices.into_iter().map(member).collect();
         (self.last, self.counters, self.phase_ns) =
             (Setpoint::default(), Counters::default(), None);
-        (self.asks, self.sent, self.clock_misses) = (0, false, 0);
+        self.asks = 0;
+        self.sent = false;
+        self.clock_misses = 0;
         self.next_ns = self.link.now_ns();
         self.come_into_op()?;
         Ok(self.attached())

@@ -243,10 +243,8 @@ impl Survey {
                     Err(Error::WorkingCounter { .. }) if place > 0 => break,
                     Err(error) => return Err(failed(&error)),
                 };
-                let (status, code) = (
-                    u16::from_le_bytes([words[0], words[1]]),
-                    u16::from_le_bytes([words[4], words[5]]),
-                );
+                let status = u16::from_le_bytes([words[0], words[1]]);
+                let code = u16::from_le_bytes([words[4], words[5]]);
                 let error = (status & 0x10 != 0).then(|| (code, al_code(code)));
                 states.push(State {
                     place,

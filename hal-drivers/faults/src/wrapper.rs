@@ -124,11 +124,9 @@ impl Driver for Wrapper {
     fn start(&mut self) -> Result<Attached, PluginError> {
         self.schedule = Schedule::new(self.plan.when, self.random);
         self.line.clear();
-        (self.handed, self.left, self.answered) = (
-            Setpoint::default(),
-            Feedback::default(),
-            Feedback::default(),
-        );
+        self.handed = Setpoint::default();
+        self.left = Feedback::default();
+        self.answered = Feedback::default();
         self.inner.start()
     }
 

@@ -169,7 +169,9 @@ impl SimulatedDrives {
             .bus_clock
             .as_ref()
             .map(|clock| BusClock::new(clock, period_s, options.seed));
-        (self.heard, self.unheard_reset, self.exchanges) = (Setpoint::default(), 0, 0);
+        self.heard = Setpoint::default();
+        self.unheard_reset = 0;
+        self.exchanges = 0;
         self.quick_stopping = false;
         self.faults.start();
         self.faults.step(0, 0, &mut self.powers);

@@ -133,7 +133,9 @@ impl Kinematics for Delta {
         let c = dx * dx + dy * dy + first[2] * first[2] - self.rod_mm * self.rod_mm;
         let z = (-b - (b * b - a * c).sqrt()) / a;
         let [to_x, to_y, to_z] = self.axes;
-        (axes[to_x], axes[to_y], axes[to_z]) = (x0 + x1 * z, y0 + y1 * z, z);
+        axes[to_x] = x0 + x1 * z;
+        axes[to_y] = y0 + y1 * z;
+        axes[to_z] = z;
         axes
     }
 

@@ -25,10 +25,8 @@ mod tests {
 
     #[test]
     fn equal_forces_count_the_same() {
-        let (coarse, fine) = (
-            force_per_torque_per_m(20.0, 1.0),
-            force_per_torque_per_m(10.0, 1.0),
-        );
+        let coarse = force_per_torque_per_m(20.0, 1.0);
+        let fine = force_per_torque_per_m(10.0, 1.0);
         assert!((resultant_nm([(0.3, coarse), (0.4, coarse)].into_iter()) - 0.5).abs() < 1e-15);
         let force_n = 100.0;
         let both = resultant_nm([(force_n / coarse, coarse), (force_n / fine, fine)].into_iter());

@@ -49,10 +49,8 @@ pub fn stribeck(points: &[Point], constant: bool) -> Option<Fit> {
         if speed == 0.0 {
             break;
         }
-        (low, high) = (
-            (speed / step).max(STRIBECK_SPEEDS.0),
-            (speed * step).min(STRIBECK_SPEEDS.1),
-        );
+        low = (speed / step).max(STRIBECK_SPEEDS.0);
+        high = (speed * step).min(STRIBECK_SPEEDS.1);
     }
     best
 }

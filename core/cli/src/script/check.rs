@@ -138,10 +138,8 @@ fn inputs(out: &mut impl Write, instance: &Instance) -> std::io::Result<()> {
 
 fn dry_run(out: &mut impl Write, policy: &Policy, ratios: &[f64]) -> std::io::Result<()> {
     let counters = policy.counters();
-    let (tuned, limited) = (
-        counters.time_constants + counters.tolerances + counters.feed_caps,
-        counters.limited,
-    );
+    let tuned = counters.time_constants + counters.tolerances + counters.feed_caps;
+    let limited = counters.limited;
     writeln!(
         out,
         "dry run     64 blocks: {} time constants, {} tolerances, {} feeds; {limited} requests limited; {} fuel",

@@ -229,10 +229,8 @@ mod tests {
     #[test]
     fn columns_are_compared_by_name_and_lone_ones_are_named() {
         let names = |list: &[&str]| list.iter().map(ToString::to_string).collect::<Vec<_>>();
-        let (a, b) = (
-            names(&["line", "x_cmd_mm", "sig_load"]),
-            names(&["x_cmd_mm", "line", "ratio"]),
-        );
+        let a = names(&["line", "x_cmd_mm", "sig_load"]);
+        let b = names(&["x_cmd_mm", "line", "ratio"]);
         let mut found = Found::of([a.clone(), b.clone()], false);
         let cells = |values: [f64; 3]| Row {
             tick: Some(0),

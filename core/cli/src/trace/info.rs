@@ -158,10 +158,8 @@ impl Totals {
                 }
             });
             let [velocity, acceleration, distance] = shown;
-            let (letter, unit) = (
-                header.axes.letter(axis),
-                if is_rotary { "deg" } else { "mm" },
-            );
+            let letter = header.axes.letter(axis);
+            let unit = if is_rotary { "deg" } else { "mm" };
             writeln!(
                 out,
                 "peak {letter}       {velocity:.3} {unit}/s, {acceleration:.1} {unit}/s², feedback off by {distance:.6} {unit}"

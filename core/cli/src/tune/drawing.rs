@@ -171,10 +171,8 @@ fn parameter(
 fn worth(made: &Made<'_>, steps: &[TuneStep]) -> String {
     let range = |index: usize| {
         let values = || steps.iter().filter_map(move |step| Some(step.at?[index]));
-        let (low, high) = (
-            values().fold(f64::INFINITY, f64::min),
-            values().fold(0.0, f64::max),
-        );
+        let low = values().fold(f64::INFINITY, f64::min);
+        let high = values().fold(0.0, f64::max);
         if low > 0.0 && high.is_finite() {
             100.0 * (high / low - 1.0)
         } else {

@@ -48,7 +48,9 @@ impl Recovery {
 
     /// Forgets the way: σ is constant.
     pub(super) fn clear(&mut self) {
-        (self.count, self.passed, self.keeps_feed) = (0, 0, false);
+        self.count = 0;
+        self.passed = 0;
+        self.keeps_feed = false;
     }
 
     /// Goes on with this σ̈. What is beyond the room for it is not noted.
@@ -387,10 +389,8 @@ mod tests {
         let (sigma, peak, speed) = (0.9, 900.0, 100.0);
         let whole_s = sigma * PERIOD_S;
         let mut hump = Segment::rest(&AxisVector::ZERO, 1.0);
-        let (third, fourth) = (
-            4.0 * peak / whole_s / 6.0,
-            -4.0 * peak / whole_s / whole_s / 12.0,
-        );
+        let third = 4.0 * peak / whole_s / 6.0;
+        let fourth = -4.0 * peak / whole_s / whole_s / 12.0;
         hump.coefficients[0] = [0.0, speed, 0.0, third, fourth, 0.0];
         hump.flags = SegmentFlags::default();
         let mut limits = limits();

@@ -277,10 +277,8 @@ mod tests {
 
     #[test]
     fn what_homing_has_found_is_between_axes_and_joints_in_both_directions() {
-        let (axes, found) = (
-            AxisVector::from_slice(&[10.0, -4.0]),
-            AxisVector::from_slice(&[0.5, 3.0]),
-        );
+        let axes = AxisVector::from_slice(&[10.0, -4.0]);
+        let found = AxisVector::from_slice(&[0.5, 3.0]);
         let mut space = plain();
         *space.offset_mut() = found;
         let joints = space.joints_of(&config(), &axes);

@@ -61,10 +61,8 @@ impl Missed {
         // More than are remembered at once are too many anyway.
         let too_many = (first..first + periods.min(self.last.len() as u64))
             .any(|period| self.remember(period));
-        let (missed, most) = (
-            self.last.len() as u64,
-            (self.last.len() as u64).saturating_sub(1),
-        );
+        let missed = self.last.len() as u64;
+        let most = (self.last.len() as u64).saturating_sub(1);
         too_many.then_some(FaultKind::MissedPeriods {
             missed,
             most,

@@ -118,10 +118,8 @@ fn piece_target(
 ) -> f64 {
     let ratios = bounds.ratios;
     let to_s = from_s + piece_s;
-    let (before, behind) = (
-        segment.path_speed_mm_per_s(from_s),
-        segment.path_speed_mm_per_s(to_s),
-    );
+    let before = segment.path_speed_mm_per_s(from_s);
+    let behind = segment.path_speed_mm_per_s(to_s);
     let of_places = within(bounds.way_speed_mm_per_s, behind);
     if segment.flags.contains(SegmentFlags::RAPID) {
         return ratios.rapid.min(of_places);

@@ -66,7 +66,9 @@ impl Progress {
     }
 
     fn begin(&mut self, now_s: f64) {
-        (self.periods, self.from_s, self.asked) = (0, now_s, 1.0);
+        self.periods = 0;
+        self.from_s = now_s;
+        self.asked = 1.0;
     }
 
     /// After a move that `reached` something: program time has got on, or nothing asks for it, or that is the fault given. It is

@@ -73,7 +73,9 @@ impl Led {
     }
 
     fn begin(&mut self, to: f64) {
-        (self.from, self.to, self.passed) = (self.now(), to, 0);
+        self.from = self.now();
+        self.to = to;
+        self.passed = 0;
     }
 
     fn step(&mut self) {

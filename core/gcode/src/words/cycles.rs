@@ -276,10 +276,8 @@ fn holes(line: &mut Line, kind: Kind, at: &AxisVector) -> Checked<Holes> {
     let (normal, plane) = axes(line.letters, plane).ok_or_else(missing)?;
     let sticky = sticky(line, kind, normal)?;
     let initial_mm = *line.state.cycles.initial_mm.get_or_insert(at[normal]);
-    let (r_mm, depth_mm) = (
-        sticky.r_mm.unwrap_or_default(),
-        sticky.depth_mm.unwrap_or_default(),
-    );
+    let r_mm = sticky.r_mm.unwrap_or_default();
+    let depth_mm = sticky.depth_mm.unwrap_or_default();
     // With G91 R is measured from where the first of the cycles began, and the bottom from R.
     let absolute = line.state.modes.absolute;
     let r_mm = if absolute { r_mm } else { initial_mm + r_mm };

@@ -103,10 +103,8 @@ impl Body for Bus {
                 .stall_ns(&self.computer.at_work, self.exchanges);
         self.now.set(self.now.get() + worked_ns);
         let passed = (self.now.get() as f64 - self.first_ns) / self.period_ns;
-        let (pulse, in_step) = (
-            passed.floor() as i64,
-            passed * self.period_ns > self.lock_s * 1e9,
-        );
+        let pulse = passed.floor() as i64;
+        let in_step = passed * self.period_ns > self.lock_s * 1e9;
         self.phase_ns = ((passed - passed.floor() - 0.5) * self.period_ns).round() as i64;
         if self.exchanges > 1 {
             let empty = (pulse - self.pulse - 1).max(0);

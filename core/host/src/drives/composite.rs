@@ -327,7 +327,9 @@ impl Composite {
 
     #[inline]
     fn forget(&mut self, feedback: &mut Feedback) {
-        (feedback.homed, feedback.inputs, feedback.has_phase) = (0, 0, 0);
+        feedback.homed = 0;
+        feedback.inputs = 0;
+        feedback.has_phase = 0;
         if self.latches > 0 {
             self.forget_latches(feedback);
         }

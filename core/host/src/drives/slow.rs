@@ -231,7 +231,9 @@ impl Driver for Slow {
     fn start(&mut self) -> Result<Attached, PluginError> {
         // What was told and answered before a stop is of no use behind it.
         let _ = (self.shared.message.pop(), self.shared.answered.pop());
-        (self.period, self.spindle_since, self.answered) = (0, 0, 0);
+        self.period = 0;
+        self.spindle_since = 0;
+        self.answered = 0;
         (self.last, self.feedback) = (Setpoint::default(), Feedback::default());
         self.driver()
             .map_or_else(|| Err(does_not_answer()), |mut driver| driver.start())

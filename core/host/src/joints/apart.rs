@@ -152,10 +152,8 @@ impl RunObserver for Joined<'_> {
 
     fn block(&mut self, block: &Block, curve: Option<Curve<'_>>, report: &BlockReport) {
         let mut block = *block;
-        (block.start, block.end) = (
-            self.apart.joined(&block.start),
-            self.apart.joined(&block.end),
-        );
+        block.start = self.apart.joined(&block.start);
+        block.end = self.apart.joined(&block.end);
         self.observer.block(&block, curve, report);
     }
 

@@ -49,10 +49,8 @@ impl JointSpace {
     }
 
     fn found(machine: &Machine, registry: &Registry) -> Result<Self, HostError> {
-        let (axes, are_own) = (
-            machine.axes.count(),
-            machine.kinematics.plugin == "identity",
-        );
+        let axes = machine.axes.count();
+        let are_own = machine.kinematics.plugin == "identity";
         let (joints, kinematics) = stated::joints(machine, registry)?;
         let Some(kinematics) = kinematics else {
             let mut limits = machine.limits;

@@ -63,37 +63,29 @@ fn cause(names: &Names<'_>, kind: &FaultKind, known: Known<'_>) -> String {
             limit,
         } => names.guard(*breach, *axis, *value, *limit),
         FaultKind::Drive { joint, code } => {
-            let (driver, named, code) = (
-                names.driver(*joint),
-                names.joint(*joint),
-                names.code(*joint, *code),
-            );
+            let driver = names.driver(*joint);
+            let named = names.joint(*joint);
+            let code = names.code(*joint, *code);
             format!("driver {driver}: the drive of {named} reports fault {code}")
         }
         FaultKind::Lost { joint, code } => {
-            let (driver, named, code) = (
-                names.driver(*joint),
-                names.joint(*joint),
-                names.code_if_any(*joint, *code),
-            );
+            let driver = names.driver(*joint);
+            let named = names.joint(*joint);
+            let code = names.code_if_any(*joint, *code);
             format!(
                 "driver {driver}: the drive of {named} is lost: the driver does not reach it{code}"
             )
         }
         FaultKind::LetGo { joint, state } => {
-            let (driver, named, state) = (
-                names.driver(*joint),
-                names.joint(*joint),
-                state_text(*state),
-            );
+            let driver = names.driver(*joint);
+            let named = names.joint(*joint);
+            let state = state_text(*state);
             format!("driver {driver}: the drive of {named} has let go: it is {state}")
         }
         FaultKind::NotEnabled { joint, state, code } => {
-            let (driver, named, code) = (
-                names.driver(*joint),
-                names.joint(*joint),
-                names.code_if_any(*joint, *code),
-            );
+            let driver = names.driver(*joint);
+            let named = names.joint(*joint);
+            let code = names.code_if_any(*joint, *code);
             let (within_s, state) = (names.drives.describe().enable_s, state_text(*state));
             format!(
                 "driver {driver}: {named} was not enabled within {within_s} s: its drive is {state}{code}"
@@ -234,11 +226,9 @@ impl Names<'_> {
     }
 
     fn not_homed(&self, joint: usize, state: JointState, code: u32, within_s: f64) -> String {
-        let (driver, code, joint) = (
-            self.driver(joint),
-            self.code_if_any(joint, code),
-            self.joint(joint),
-        );
+        let driver = self.driver(joint);
+        let code = self.code_if_any(joint, code);
+        let joint = self.joint(joint);
         let state = state_text(state);
         format!(
             "driver {driver}: {joint} was not homed by its drive within {within_s} s: it is {state}{code}"

@@ -46,11 +46,9 @@ fn end_of_loaded(head: &[u8]) -> Option<u64> {
     if !head.starts_with(b"\x7fELF\x02\x01") {
         return None;
     }
-    let (table, size, count) = (
-        number(32, 8)? as usize,
-        number(54, 2)? as usize,
-        number(56, 2)? as usize,
-    );
+    let table = number(32, 8)? as usize;
+    let size = number(54, 2)? as usize;
+    let count = number(56, 2)? as usize;
     let mut end = 0;
     for header in 0..count {
         let at = table.checked_add(header * size)?;
@@ -69,7 +67,9 @@ mod tests {
     fn elf(offset: u64, bytes: u64) -> Vec<u8> {
         let mut head = vec![0; 64 + 2 * 56];
         head[..6].copy_from_slice(b"\x7fELF\x02\x01");
-        (head[32], head[54], head[56]) = (64, 56, 2);
+        head[32] = 64;
+        head[54] = 56;
+        head[56] = 2;
         for (at, kind, bytes) in [(64, 1, bytes), (120, 4, 10 * bytes)] {
             head[at] = kind;
             head[at + 8..at + 16].copy_from_slice(&offset.to_le_bytes());

@@ -33,10 +33,8 @@ pub fn summarise(
             .map(|i| (axes.letter(i).to_lowercase().to_string(), shown(i)))
             .collect()
     };
-    let (linear, rotary) = (
-        |values: &AxisVector| of(false, values),
-        |values: &AxisVector| of(true, values),
-    );
+    let linear = |values: &AxisVector| of(false, values);
+    let rotary = |values: &AxisVector| of(true, values);
     Summary {
         format: SUMMARY_FORMAT,
         program: program.to_string(),

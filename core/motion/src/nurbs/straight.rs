@@ -128,10 +128,8 @@ impl Nurbs {
             return;
         }
         *parts -= 1;
-        let (forth, back) = (
-            steps().all(|step| step >= 0.0),
-            steps().all(|step| step <= 0.0),
-        );
+        let forth = steps().all(|step| step >= 0.0);
+        let back = steps().all(|step| step <= 0.0);
         if !forth && !back {
             let halves = part.halves();
             let look = |half| {

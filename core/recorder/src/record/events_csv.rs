@@ -238,10 +238,8 @@ impl EventsCsv {
     }
 
     fn rows(&mut self, period: &Period) -> std::io::Result<()> {
-        let (now, last) = (
-            period.switched,
-            std::mem::replace(&mut self.last, period.switched),
-        );
+        let now = period.switched;
+        let last = std::mem::replace(&mut self.last, period.switched);
         while let Some(word) = self
             .told
             .pop_front_if(|word| word.before_block <= period.block)
@@ -252,10 +250,8 @@ impl EventsCsv {
             self.row(period, What::Spindle, now.spindle_rad_per_s)?;
         }
         if std::mem::replace(&mut self.waits, period.waits) != period.waits {
-            let (time_s, waits) = (
-                TraceCsv::t_s(period.tick, self.period_s),
-                u8::from(period.waits),
-            );
+            let time_s = TraceCsv::t_s(period.tick, self.period_s);
+            let waits = u8::from(period.waits);
             writeln!(
                 self.out,
                 "{time_s},{},{},waits for spindle,{waits},spindle",
@@ -294,18 +290,14 @@ impl EventsCsv {
         let by_word = (switched.by == SwitchedBy::Program)
             .then(|| self.line_of(what, value, *block))
             .flatten();
-        let (time_s, line) = (
-            TraceCsv::t_s(*tick, self.period_s),
-            by_word.unwrap_or(*line),
-        );
-        let (word, shown) = (
-            what.shown(),
-            if what == What::Spindle {
-                rpm(value).round_if_close()
-            } else {
-                value
-            },
-        );
+        let time_s = TraceCsv::t_s(*tick, self.period_s);
+        let line = by_word.unwrap_or(*line);
+        let word = what.shown();
+        let shown = if what == What::Spindle {
+            rpm(value).round_if_close()
+        } else {
+            value
+        };
         // Names and numbers: nothing that a CSV would have to quote.
         writeln!(
             self.out,

@@ -86,11 +86,9 @@ impl RoughCsv {
 
     /// The row of what lies between where the rough period began and the last sample.
     fn row(&mut self) -> Result<(), RecordError> {
-        let (command, end_feed, tick) = (
-            self.last.command,
-            self.last.end_feed_mm_per_s,
-            self.last.tick,
-        );
+        let command = self.last.command;
+        let end_feed = self.last.end_feed_mm_per_s;
+        let tick = self.last.tick;
         let Some((from, start_feed, since)) = self.from.replace((command, end_feed, tick)) else {
             return Ok(());
         };

@@ -18,10 +18,8 @@ const AREA: [f64; 4] = [64.0, 900.0, 14.0, 214.0];
 pub fn histogram(series: &[LatencySeries]) -> String {
     let most = bins(series).map(|bin| bin.count).max().unwrap_or(0) as f64;
     // A count of one stands a little above the ground.
-    let (x, y) = (
-        lateness(series),
-        Scale::new(0.5, most.max(1.0), AREA[3], AREA[2]),
-    );
+    let x = lateness(series);
+    let y = Scale::new(0.5, most.max(1.0), AREA[3], AREA[2]);
     let mut bars = String::new();
     for (index, one) in series.iter().enumerate() {
         for bin in one.bins.iter().filter(|bin| bin.count > 0) {
@@ -46,10 +44,8 @@ pub fn histogram(series: &[LatencySeries]) -> String {
 /// Stairs that fall from all of the wake-ups to the latest.
 pub fn later(series: &[LatencySeries]) -> String {
     let most = series.iter().map(LatencySeries::count).max().unwrap_or(0) as f64;
-    let (x, y) = (
-        lateness(series),
-        Scale::new(0.5 / most.max(1.0), 1.0, AREA[3], AREA[2]),
-    );
+    let x = lateness(series);
+    let y = Scale::new(0.5 / most.max(1.0), 1.0, AREA[3], AREA[2]);
     let mut curves = String::new();
     for (index, one) in series.iter().enumerate().filter(|(_, one)| one.count() > 0) {
         let all = one.count();

@@ -57,10 +57,8 @@ impl Linear {
             .into_iter()
             .find(|step| *step >= rough);
         let step = step.unwrap_or(10.0 * decade);
-        let (first, last) = (
-            (self.low / step).ceil() as i64,
-            (self.high / step).floor() as i64,
-        );
+        let first = (self.low / step).ceil() as i64;
+        let last = (self.high / step).floor() as i64;
         (first..=last).map(|n| n as f64 * step).collect()
     }
 }

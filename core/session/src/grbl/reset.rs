@@ -79,10 +79,8 @@ impl Sender {
         }
         self.fault.clone_from(&words);
         let Some(words) = words else { return };
-        let (homes, probes) = (
-            self.last_mode == Mode::Homing,
-            matches!(self.pending, Some(Pending::Driven { probes: true, .. })),
-        );
+        let homes = self.last_mode == Mode::Homing;
+        let probes = matches!(self.pending, Some(Pending::Driven { probes: true, .. }));
         if probes {
             self.tell_probe();
         }

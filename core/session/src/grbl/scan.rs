@@ -158,7 +158,9 @@ impl Scanner {
 
     /// The line that has not ended yet never was.
     pub fn forget(&mut self) {
-        (self.bytes, self.too_long, self.behind_lead) = (0, false, false);
+        self.bytes = 0;
+        self.too_long = false;
+        self.behind_lead = false;
         self.text.clear();
     }
 }

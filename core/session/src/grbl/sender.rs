@@ -187,7 +187,9 @@ impl Sender {
     /// Lines that have come are never looked at.
     pub(super) fn forget_lines(&mut self) {
         self.lines.clear();
-        (self.bytes, self.pending_bytes, self.pending) = (0, 0, None);
+        self.bytes = 0;
+        self.pending_bytes = 0;
+        self.pending = None;
         // What a thread still judges is then taken by nobody.
         self.called = None;
     }

@@ -148,7 +148,9 @@ impl Homing {
             None => (BlockKind::Rapid, f64::INFINITY),
         };
         block.path_mode = PathMode::ExactStop;
-        (block.index, block.length_mm, block.stop_on) = (self.blocks, length_mm, stop_on);
+        block.index = self.blocks;
+        block.length_mm = length_mm;
+        block.stop_on = stop_on;
         if stop_on.edge == Edge::None {
             self.position = block.end;
         }

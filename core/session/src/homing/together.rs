@@ -119,7 +119,11 @@ impl Together {
     }
 
     fn begin(&mut self, phase: Phase, open: u32) {
-        (self.phase, self.open, self.unread, self.changed, self.stops) = (phase, open, 0, 0, 0);
+        self.phase = phase;
+        self.open = open;
+        self.unread = 0;
+        self.changed = 0;
+        self.stops = 0;
         self.alone_from_mm.fill(None);
     }
 

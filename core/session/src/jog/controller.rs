@@ -178,13 +178,18 @@ impl JogController {
     /// they are, nor will it be then.
     pub(crate) fn enable(&self, controls: Arc<Controls>, ready: bool, unknown: u32) {
         let mut inner = self.lock();
-        (inner.controls, inner.ready, inner.unknown) = (Some(controls), ready, unknown);
+        inner.controls = Some(controls);
+        inner.ready = ready;
+        inner.unknown = unknown;
     }
 
     /// The run is over: the machine stands at `position`.
     pub(crate) fn disable(&self, position: AxisVector) {
         let mut inner = self.lock();
-        (inner.controls, inner.moving, inner.position, inner.ready) = (None, None, position, false);
+        inner.controls = None;
+        inner.moving = None;
+        inner.position = position;
+        inner.ready = false;
         inner.waiting.clear();
     }
 

@@ -164,8 +164,12 @@ impl OperatorHub {
     /// Another job of a machine that stays begins, or its fault is taken back: what was said of the one before is over. Host.
     pub fn begin_job(&self) {
         let mut latest = self.latest();
-        (latest.fault, latest.stopped, latest.waits_on_line) = (None, None, None);
-        (latest.waits_for_reset, latest.ended, latest.rests) = (false, false, true);
+        latest.fault = None;
+        latest.stopped = None;
+        latest.waits_on_line = None;
+        latest.waits_for_reset = false;
+        latest.ended = false;
+        latest.rests = true;
         (latest.progress, latest.sigma) = (0.0, 1.0);
         drop(latest);
         self.go_on.store(false, Release);
@@ -211,7 +215,9 @@ impl OperatorHub {
     /// A sample was sent; `progress` is the share of the program's path that is driven. Host.
     pub fn sample(&self, sample: &Sample, progress: f64) {
         let mut latest = self.latest();
-        (latest.position, latest.sigma, latest.progress) = (sample.command, sample.sigma, progress);
+        latest.position = sample.command;
+        latest.sigma = sample.sigma;
+        latest.progress = progress;
         latest.rests = sample.feed_mm_per_s == 0.0 && sample.state != MachineState::Stopping;
     }
 

@@ -34,10 +34,8 @@ impl Mailbox {
     /// Takes a message; what it answers waits to be read.
     pub(crate) fn take(&mut self, message: &[u8], context: &mut Context) {
         let length = usize::from(u16_at(message, 0));
-        let (kind, number) = (
-            message.get(5).map_or(0, |byte| byte & 15),
-            message.get(5).map_or(0, |byte| byte >> 4 & 7),
-        );
+        let kind = message.get(5).map_or(0, |byte| byte & 15);
+        let number = message.get(5).map_or(0, |byte| byte >> 4 & 7);
         // A message that comes twice under one number is the first one again.
         if number != 0 && number == self.received {
             return;

@@ -165,11 +165,9 @@ fn mapping(plan: ProcessPlan, dictionary: &Dictionary) -> Option<Mapping> {
         let pdo = dictionary.number(assignment, sub) as u16;
         for sub in 1..=dictionary.number(pdo, 0).min(u64::from(u8::MAX)) as u8 {
             let entry = dictionary.number(pdo, sub) as u32;
-            let (index, sub, bits) = (
-                (entry >> 16) as u16,
-                (entry >> 8) as u8,
-                (entry & 0xff) as usize,
-            );
+            let index = (entry >> 16) as u16;
+            let sub = (entry >> 8) as u8;
+            let bits = (entry & 0xff) as usize;
             // What is mapped and not there, as in a device that only its SII describes, takes its place and no value.
             parts.extend(
                 dictionary
@@ -259,11 +257,9 @@ pub(crate) fn judge_write(
 }
 
 fn judge_mapped(dictionary: &Dictionary, pdo: u16, mapped: u32) -> Result<(), Abort> {
-    let (index, sub, bits) = (
-        (mapped >> 16) as u16,
-        (mapped >> 8) as u8,
-        (mapped & 0xff) as usize,
-    );
+    let index = (mapped >> 16) as u16;
+    let sub = (mapped >> 8) as u8;
+    let bits = (mapped & 0xff) as usize;
     if index == 0 || (1..8).contains(&index) {
         // A gap.
         return Ok(());

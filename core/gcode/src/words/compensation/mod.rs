@@ -236,12 +236,11 @@ fn on(line: &mut Line, side: f64, diameter_mm: f64) -> Checked<()> {
     let programmed = plane.map(|axis| line.state.path.position[axis]);
     // A negative diameter is one on the other side.
     let side = if diameter_mm < 0.0 { -side } else { side };
-    let (code, radius_mm) = (
-        line.orders
-            .get(Group::CutterRadius)
-            .map_or(410, |word| word.tenths),
-        diameter_mm.abs() / 2.0,
-    );
+    let code = line
+        .orders
+        .get(Group::CutterRadius)
+        .map_or(410, |word| word.tenths);
+    let radius_mm = diameter_mm.abs() / 2.0;
     line.state.compensation = Compensation {
         code,
         side,
@@ -277,10 +276,8 @@ pub(crate) fn straight(line: &mut Line, kind: BlockKind) -> Checked<()> {
     }
     let plane = line.state.compensation.plane;
     let to = plane.map(|axis| line.state.path.position[axis]);
-    let (side, radius_mm) = (
-        line.state.compensation.side,
-        line.state.compensation.radius_mm,
-    );
+    let side = line.state.compensation.side;
+    let radius_mm = line.state.compensation.radius_mm;
     let from = if line.state.compensation.fresh {
         let at = plane.map(|axis| line.state.path.last_end[axis]);
         if distance(at, to) <= radius_mm {
@@ -322,10 +319,8 @@ pub(crate) fn bent(line: &mut Line, ends: &Ends, parts: &Parts, plane: [usize; 2
     if line.state.compensation.is_lost(line.state.path.uncertain) {
         return pass(line);
     }
-    let (side, radius_mm) = (
-        line.state.compensation.side,
-        line.state.compensation.radius_mm,
-    );
+    let side = line.state.compensation.side;
+    let radius_mm = line.state.compensation.radius_mm;
     let Some(first) = parts.as_slice().first() else {
         return Ok(());
     };
@@ -502,11 +497,9 @@ fn turn(
 ) -> Checked<()> {
     let compensation = &line.state.compensation;
     let plane = compensation.plane;
-    let (side, radius_mm, corner) = (
-        compensation.side,
-        compensation.radius_mm,
-        compensation.programmed,
-    );
+    let side = compensation.side;
+    let radius_mm = compensation.radius_mm;
+    let corner = compensation.programmed;
     let tool = (side, radius_mm);
     let before = compensation.direction;
     let end = along(corner, beside(before, side), radius_mm);

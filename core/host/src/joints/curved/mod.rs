@@ -313,10 +313,8 @@ impl Taking<'_> {
             (segment.duration_s / INTERVAL_S).ceil()
         };
         let h = segment.duration_s / parts;
-        let (begins, ends) = (
-            segment.flags.contains(SegmentFlags::BLOCK_BEGINS),
-            segment.flags.contains(SegmentFlags::BLOCK_ENDS),
-        );
+        let begins = segment.flags.contains(SegmentFlags::BLOCK_BEGINS);
+        let ends = segment.flags.contains(SegmentFlags::BLOCK_ENDS);
         let point = |part: f64| {
             let junction = (part == 0.0 && begins) || (part == parts && ends);
             Point::of(segment, (h * part, junction), steps, self.space, self.axes)
