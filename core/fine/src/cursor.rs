@@ -469,4 +469,20 @@ mod tests {
         assert_eq!((cursor.segment().block, cursor.epoch()), (7, 1));
         assert_eq!(cursor.program_time_s(), 0.75);
     }
+
+    /// A motion at a feed that waits for no input is a cut; a dwell, a rapid and a probe are none.
+    #[test]
+    fn a_cut_moves_at_a_feed_and_waits_for_nothing() {
+        let mut moving = Segment::rest(&AxisVector::ZERO, 1.0);
+        moving.flags = SegmentFlags::default();
+        assert!(!is_cut(&moving), "nothing moves");
+        moving.path[3] = 1.0;
+        assert!(is_cut(&moving));
+        let mut rapid = moving;
+        rapid.flags = SegmentFlags::RAPID;
+        assert!(!is_cut(&rapid));
+        let mut probe = moving;
+        probe.stop_on.edge = Edge::Rising;
+        assert!(!is_cut(&probe));
+    }
 }
