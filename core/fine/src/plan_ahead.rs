@@ -584,4 +584,30 @@ mod tests {
             assert_eq!(found, (speed, max_feed), "{ahead_s}");
         }
     }
+
+    /// Only axes whose speed the feed is at both places count in the way from one to the other.
+    #[test]
+    fn the_way_between_places_is_that_of_axes_which_count_at_both() {
+        let place = |path_mm, position: [f64; 3], counted| {
+            let mut all = [0.0; MAX_AXES];
+            all[..3].copy_from_slice(&position);
+            Pace {
+                path_mm,
+                position: all,
+                counted,
+                speed: 1.0,
+                rise: 0.0,
+            }
+        };
+        let from = place(10.0, [0.0; 3], 0b011);
+        for (to, way_mm) in [
+            (place(12.0, [3.0, 4.0, 90.0], 0b011), 5.0),
+            (place(12.0, [3.0, 4.0, 90.0], 0b111), 5.0),
+            (place(12.0, [3.0, 4.0, 90.0], 0b101), 3.0),
+            (place(17.0, [3.0, 4.0, 90.0], 0b011), 7.0),
+            (place(12.0, [3.0, 4.0, 90.0], 0b100), 2.0),
+        ] {
+            assert_eq!(from.way_to_mm(&to), way_mm);
+        }
+    }
 }

@@ -392,6 +392,35 @@ mod tests {
         assert_eq!(f64::from(most), FEED_WAY_PERIODS[1]);
     }
 
+    /// A rate of 10 per second that is braked with 1000/s² goes on by 0.05 and comes back: beyond the range only from near its end.
+    #[test]
+    fn a_rate_turns_beyond_its_range_only_near_an_end_of_it() {
+        let segment = Segment::rest(&AxisVector::ZERO, 0.1);
+        let ahead = Ahead::new(&segment, Some(0.0), 0, None);
+        for (sigma, rate_per_s, step_s, expected) in [
+            (0.96, 10.0, 0.02, true),
+            (0.94, 10.0, 0.02, false),
+            (0.04, -10.0, 0.02, true),
+            (0.06, -10.0, 0.02, false),
+            // The step ends before it turns.
+            (0.96, 10.0, 0.009, false),
+            (0.04, -10.0, 0.009, false),
+        ] {
+            let from = RateState {
+                sigma,
+                rate_per_s,
+                place: ahead.place(TWO_LINEAR),
+                recent: Recent::default(),
+            };
+            let change = -100.0 * rate_per_s;
+            assert_eq!(
+                turns_beyond(&from, change, step_s),
+                expected,
+                "{sigma} {step_s}"
+            );
+        }
+    }
+
     /// A plan that ends at rest with a speed that rounding has left below zero is not too fast there.
     #[test]
     fn the_rounding_of_a_rest_ahead_lowers_no_rate() {

@@ -340,4 +340,19 @@ mod tests {
             assert_eq!(checked.breach.is_none(), is_relaxed);
         }
     }
+
+    /// Where the position is set anew the axes are elsewhere, and the drives are told what they were told before.
+    #[test]
+    fn a_position_that_is_set_anew_moves_no_drive() {
+        let config = FineConfig::new(0.001, Limits::new(&[AxisLimits::unlimited(); 2]).unwrap());
+        let mut actuation = Actuation::new(&config, Box::new(Echo::default()), None);
+        let by = AxisVector::from_slice(&[3.0, -0.5]);
+        let before = actuation.sent(&config);
+        for times in [1.0, 2.0] {
+            actuation.correct(&by);
+            assert_eq!(actuation.position(), by * times);
+            let joints = actuation.joints_of(&config, &actuation.position());
+            assert_eq!(joints, before);
+        }
+    }
 }
