@@ -45,7 +45,6 @@ use hand_over::{Found, HandOver};
 use missed::Missed;
 use operator::Operator;
 use rate::Rate;
-use ratio::Ratios;
 use release::Release;
 pub use report::{JobEnd, Left};
 use report::{Present, Report};
@@ -398,7 +397,7 @@ impl FineLoop {
         }
     }
 
-    fn ratios_in_force(&self) -> Ratios {
+    fn ratios_in_force(&self) -> ratio::Ratios {
         self.rate
             .ratios_in_force(&self.config, &self.outputs, self.operator.inputs())
     }
