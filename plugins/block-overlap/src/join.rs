@@ -34,7 +34,8 @@ pub struct Join {
 const NO_OVERLAP_TICKS: f64 = 1e-3;
 
 /// Where turning takes more than its share there is nothing to brake with while the blocks overlap: then they overlap for
-/// this share of a ramp at most, and the rest of it can stop the machine.
+/// this share of a ramp at most, and the rest of it can stop the machine. With half of it the raster of the examples takes 0.5 % longer;
+/// with all of the ramp it would take 0.04 % less, with nothing left to stop with.
 const HALF: f64 = 0.5;
 
 impl Join {
