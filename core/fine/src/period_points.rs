@@ -162,3 +162,33 @@ impl PeriodPoints {
 pub fn larger(most: f64, value: f64) -> f64 {
     if value > most { value } else { most }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cursor::Cursor;
+    use rtrb::RingBuffer;
+    use tandem_rings::Queued;
+    use tandem_sdk::{AxisVector, SegmentFlags};
+
+    /// As many segments as are looked at, of 0.1 ms each, have room for all of their points.
+    #[test]
+    fn a_horizon_of_short_segments_is_covered() {
+        let (mut input, output) = RingBuffer::new(LOOK_ENTRIES + 2);
+        for index in 0..LOOK_ENTRIES {
+            let mut segment = Segment::rest(&AxisVector::ZERO, 1e-4);
+            segment.flags = SegmentFlags::default();
+            segment.coefficients[0][1] = 1.0 + index as f64;
+            let start_s = 0.0;
+            input.push(Queued::Segment { start_s, segment }).unwrap();
+        }
+        let mut cursor = Cursor::new(output, &AxisVector::ZERO);
+        cursor.advance(1e-9, |_| false);
+        let mut points = PeriodPoints::new(&[AxisLimits::unlimited(); MAX_AXES], 1);
+        let horizon_s = 1e-4 * (LOOK_ENTRIES as f64 - 1.5);
+        points.fill(&cursor.ahead(), horizon_s);
+        assert_eq!(points.covered_s, horizon_s);
+        let fastest = points.iter().map(|point| point.velocity[0]);
+        assert_eq!(fastest.fold(0.0, f64::max), LOOK_ENTRIES as f64 - 1.0);
+    }
+}
