@@ -118,7 +118,7 @@ pub fn positive_parameters<const N: usize>(
         if after < before {
             logs = next;
             here = there;
-            damping = damping / 3.0;
+            damping /= 3.0;
             if after > before * (1.0 - WORTH) || after < 1e-18 {
                 break;
             }

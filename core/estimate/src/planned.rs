@@ -551,7 +551,7 @@ impl Fit<'_> {
                     let after = square(&there);
                     logs = next;
                     here = there;
-                    damping = damping / 5.0;
+                    damping /= 5.0;
                     if after > before * (1.0 - WORTH) {
                         break 'steps;
                     }

@@ -95,7 +95,7 @@ mod tests {
                 worst_of_judged(mode, &worst),
                 worst_of_reported(mode, &worst),
             ]
-            .map(|words| words.unwrap_or_default())
+            .map(Option::unwrap_or_default)
         };
         let within = "X jerk 100.50 % at tick 7, line 3, running, within the tolerance";
         assert_eq!(told("limit", 1.0, 1.005), [within, ""]);

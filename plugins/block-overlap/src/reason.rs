@@ -138,7 +138,7 @@ mod tests {
             assert_eq!(held(taken(mode, 50.0), |_, _| ()), LimitedBy::Policy);
         }
         let at_rest = held(taken(Mode::Rest, 50.0), |_, taken| {
-            taken.corner.tight = true
+            taken.corner.tight = true;
         });
         assert_eq!(at_rest, LimitedBy::Tolerance);
     }
@@ -174,11 +174,11 @@ mod tests {
         let brief = at_cap(&|_, taken| taken.corner.longest_s = 0.02);
         assert_eq!([short, narrow, brief], [LimitedBy::Junction; 3]);
         let late = held(taken(Mode::Late, 40.0), |_, taken| {
-            taken.corner.cap_mm_per_s = 40.0
+            taken.corner.cap_mm_per_s = 40.0;
         });
         assert_eq!(late, LimitedBy::Junction);
         let triangle = held(taken(Mode::Rest, 40.0), |entry, _| {
-            entry.triangle_mm_per_s = 40.0
+            entry.triangle_mm_per_s = 40.0;
         });
         assert_eq!(triangle, LimitedBy::Acceleration);
         for (mode, expected) in [
@@ -186,11 +186,11 @@ mod tests {
             (Mode::Late, LimitedBy::Junction),
         ] {
             let before_slower = held(taken(mode, 40.0), |_, taken| {
-                taken.next_feed_mm_per_s = 30.0
+                taken.next_feed_mm_per_s = 30.0;
             });
             assert_eq!(before_slower, expected);
             let before_equal = held(taken(mode, 40.0), |_, taken| {
-                taken.next_feed_mm_per_s = 40.0
+                taken.next_feed_mm_per_s = 40.0;
             });
             assert_eq!(before_equal, LimitedBy::Junction);
         }

@@ -392,8 +392,10 @@ mod tests {
         arc.end = AxisVector::from_slice(&[RADIUS, RADIUS]);
         let on_arc = |angle: f64| [RADIUS * angle.sin(), RADIUS - RADIUS * angle.cos()];
         let angles = (1..=200).map(|n| f64::from(n) / 200.0 * std::f64::consts::FRAC_PI_2);
-        let mut flat = Flat::default();
-        flat.points = vec![[0.0, 0.0]];
+        let mut flat = Flat {
+            points: vec![[0.0, 0.0]],
+            ..Flat::default()
+        };
         route.push(&line, &flat, &frame, 1.0, TOLERANCE);
         (flat.points, flat.curved) = (angles.map(on_arc).collect(), true);
         route.push(&arc, &flat, &frame, 1.0, TOLERANCE);

@@ -137,7 +137,7 @@ pub fn planning_speed(program: &Path) -> Option<f64> {
         let mut away = Away::default();
         let started = processor_time();
         stream(planner.as_mut(), &blocks, machine.rough_period_s, &mut away);
-        planning_s += (processor_time() - started).as_secs_f64();
+        planning_s += processor_time().saturating_sub(started).as_secs_f64();
         motion_s += away.duration_s;
     }
     Some(motion_s / planning_s)

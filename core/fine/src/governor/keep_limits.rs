@@ -136,14 +136,14 @@ impl WaySearch {
     pub(super) fn recoverable(
         &mut self,
         wanted: f64,
-        here: RateState<'_>,
+        here: &RateState<'_>,
         horizon: &Horizon,
     ) -> Option<f64> {
         let h = self.period_s;
-        let range = self.range(&here, h, horizon)?;
+        let range = self.range(here, h, horizon)?;
         let steady = range.nearest(-here.rate_per_s / h);
         nearest_with_way(range.nearest(wanted), steady, HALVINGS, |change| {
-            let mut way = here;
+            let mut way = *here;
             way.pass(change, h);
             let found = self.recovers(way, horizon);
             if found {

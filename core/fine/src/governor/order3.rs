@@ -94,7 +94,7 @@ impl Governor {
                     relaxed: false,
                 };
             }
-            change = below.recoverable(wanted, here, &mut self.ways, horizon);
+            change = below.recoverable(wanted, &here, &mut self.ways, horizon);
             if change.is_none() && goal.is_rest() && self.ways.found.keeps_feed {
                 self.ways.found.keeps_feed = false;
                 wanted = wanted.min(self.ways.found.peek().unwrap_or(wanted));
@@ -103,12 +103,12 @@ impl Governor {
             self.ways.found.keeps_feed = false;
         }
         if change.is_none() && !self.ways.found.keeps_feed {
-            change = self.ways.recoverable(wanted, here, horizon);
+            change = self.ways.recoverable(wanted, &here, horizon);
         } else if change.is_none() && !self.ways.keeps_limits_on(&here, horizon) {
             // The limits come before the feed.
             self.ways.found.keeps_feed = false;
             let wanted = self.ways.found.peek().unwrap_or(wanted);
-            change = self.ways.recoverable(wanted, here, horizon);
+            change = self.ways.recoverable(wanted, &here, horizon);
         }
         match change {
             Some(change) => Chosen {

@@ -175,13 +175,13 @@ impl Below<'_> {
     pub(super) fn recoverable(
         &mut self,
         wanted: f64,
-        here: RateState<'_>,
+        here: &RateState<'_>,
         ways: &mut WaySearch,
         horizon: &Horizon,
     ) -> Option<f64> {
         let h = ways.period_s;
         self.steps_left = FEED_WAY_STEPS;
-        let range = ways.range(&here, h, horizon)?;
+        let range = ways.range(here, h, horizon)?;
         let kept = ways.found.peek().filter(|_| ways.found.keeps_feed);
         let good = kept.unwrap_or(range.nearest(-MAX_LOWERING / (h * h)));
         let found = nearest_with_way(range.nearest(wanted), good, HALVINGS, |change| {
@@ -206,7 +206,7 @@ impl Below<'_> {
         self.steps_left = BEGINNINGS * FEED_WAY_STEPS;
         (0..BEGINNINGS).find_map(|halvings| {
             here.sigma = self.kept_rate + above / f64::from(1_u32 << halvings);
-            self.leaves_way(0.0, here, ways, horizon)
+            self.leaves_way(0.0, &here, ways, horizon)
                 .then_some(here.sigma)
         })
     }
@@ -215,15 +215,15 @@ impl Below<'_> {
     fn leaves_way(
         &mut self,
         change: f64,
-        here: RateState<'_>,
+        here: &RateState<'_>,
         ways: &mut WaySearch,
         horizon: &Horizon,
     ) -> bool {
         let h = ways.period_s;
-        let mut watch = Watch::new(&here, self.ratio);
-        let mut way = here;
+        let mut watch = Watch::new(here, self.ratio);
+        let mut way = *here;
         way.pass(change, h);
-        let found = !turns_beyond(&here, change, h)
+        let found = !turns_beyond(here, change, h)
             && watch.is_kept(&way, self.ratio, h)
             && (self.becomes_constant((way, watch), ways, horizon)
                 || self.becomes_slow((way, watch), ways, horizon));
