@@ -14,8 +14,7 @@ const BEHIND: f64 = 2.0;
 const STEPS: usize = 16;
 /// Chords of one block for which there is room to be made at once: no more than they take.
 const MANY: usize = 16_384;
-/// Share of the tolerance that may lie between two samples on a curve. With a tenth more a window that is refused for it is found
-/// only after some that are slower.
+/// Share of the tolerance that may lie between two samples on a curve; the rest is for what the motion stands off it.
 const BETWEEN_SAMPLES: f64 = 0.5;
 /// Direction cosine between blocks below which the path turns back: it rests there (a quarter of a degree off).
 const TURNS_BACK: f64 = -0.999_99;
