@@ -480,4 +480,23 @@ mod tests {
         }
         assert!(refused > 30, "{refused}");
     }
+
+    /// A sample at the very end of the travel is inside: what it breaks beside that is what is named.
+    #[test]
+    fn at_the_end_of_the_travel_another_limit_is_named() {
+        for end_mm in [-500.0, 500.0] {
+            let mut config = guard().config;
+            config.position[0] = end_mm * (1.0 - 4e-4);
+            let mut guard = Guard::new(&config);
+            let breach = guard.check(&AxisVector::from_slice(&[end_mm]), 0).breach;
+            assert!(matches!(
+                breach,
+                Some(FaultKind::Guard {
+                    breach: Breach::Velocity,
+                    axis: 0,
+                    ..
+                })
+            ));
+        }
+    }
 }

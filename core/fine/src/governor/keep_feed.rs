@@ -157,6 +157,30 @@ mod tests {
         is_in_dwell(&place, PERIOD_S)
     }
 
+    /// Brought down at the jerk limit after the reserve, the rise ends at the limit; how it changes with the way to there is the slope of
+    /// that.
+    #[test]
+    fn a_rise_that_is_brought_down_at_the_jerk_limit_ends_at_the_limit() {
+        let curve = Curve {
+            jerk_mm_per_s3: 10_000.0,
+            reserve_s: 0.002,
+        };
+        for below in [-30.0, -0.5, 0.01, 0.5, 3.0, 80.0] {
+            let (rise, slope_per_s) = curve.rise(below);
+            let gained = rise.abs() * 0.002 + rise * rise / 20_000.0;
+            assert!(
+                (gained * below.signum() / below - 1.0).abs() < 1e-9,
+                "{below}"
+            );
+            let step = 1e-6 * below;
+            let change = curve.rise(below + step).0 - curve.rise(below - step).0;
+            assert!(
+                (change / (2.0 * step) / slope_per_s - 1.0).abs() < 1e-4,
+                "{below}"
+            );
+        }
+    }
+
     #[test]
     fn only_what_stands_for_a_while_is_a_dwell() {
         let dwell = Segment::rest(&AxisVector::ZERO, 0.1);
