@@ -141,6 +141,32 @@ impl Grid {
         );
     }
 
+    /// Further places in parts of the path that lie between those of the grid, at which no slowdown of them would be asked for.
+    pub fn look_between(
+        &mut self,
+        route: &Route,
+        bounds: &Bounds,
+        motion: &Rated,
+        slowdowns: &Slowdowns,
+        known: usize,
+    ) {
+        for part in &slowdowns.parts()[known..] {
+            let is_in = |place: &PlaceBounds| (part.from_mm..=part.to_mm).contains(&place.s_mm);
+            let behind = self
+                .places
+                .partition_point(|places| places[0].s_mm <= part.to_mm);
+            let around = behind.saturating_sub(2)..behind;
+            if self.places[around].iter().flatten().any(is_in)
+                || self.more.iter().flatten().any(is_in)
+            {
+                continue;
+            }
+            let interval = behind.saturating_sub(1);
+            let z = motion.place(interval, f64::midpoint(part.from_mm, part.to_mm));
+            self.look_closer(route, bounds, motion, slowdowns, (interval, z));
+        }
+    }
+
     /// Three more places of an interval.
     fn look(
         &mut self,

@@ -212,6 +212,9 @@ impl Scan {
                 if n >= HOPELESS && kept.is_none() {
                     break;
                 }
+                let rated = &window.motion.rated;
+                self.grid
+                    .look_between(job.route, job.bounds, rated, &self.slowdowns, known);
                 continue;
             }
             if n == TRIES

@@ -13,6 +13,8 @@ const OFF_MM: f64 = 1e-8;
 /// the path by arc length is no smoother.
 const JERK_OFF: f64 = 0.004;
 const MIN_OFF_MM: f64 = 1.5e-9;
+/// What a segment may exceed the feed by.
+const FEED_OFF: f64 = 1.0 + 1e-4;
 /// Halvings of an interval until a segment follows the path.
 const MAX_HALVINGS: u32 = 30;
 
@@ -133,7 +135,10 @@ pub fn draw<M: Motion>(
             hermite,
         );
         if until_s - from_s < 2.0 * min_s
-            || follows(route, &mut cursor, jerk_mm_per_s3, segment) && stays(bounds, segment, true)
+            || follows(route, &mut cursor, jerk_mm_per_s3, segment)
+                && stays(bounds, segment, true)
+                && (keeps_feed(route.front(), segment)
+                    || until_s - from_s < bounds.context.fine_period_s)
         {
             break;
         }
@@ -256,6 +261,15 @@ fn stays(bounds: &Bounds, segment: &Segment, meets_ends: bool) -> bool {
             meets_ends && (beyond(b[0]) || beyond(b[5]))
                 || highest(&b, high) <= high && highest(&b.map(|v| -v), -low) <= -low
         })
+}
+
+/// Whether the segment is nowhere faster than its leg, as the motion is: where that changes much in it, a quintic through its ends is
+/// another motion on the same path.
+fn keeps_feed(leg: &Leg, segment: &Segment) -> bool {
+    let c = &segment.path;
+    let speed = [c[1], 2.0 * c[2], 3.0 * c[3], 4.0 * c[4], 5.0 * c[5]];
+    let most_mm_per_s = FEED_OFF * leg.feed_mm_per_s;
+    highest(&bernstein(&speed, segment.duration_s), most_mm_per_s) <= most_mm_per_s
 }
 
 /// A quintic that is off by e in its middle has a third derivative that is off by 384·e/T³ at its ends.
