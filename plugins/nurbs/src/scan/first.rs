@@ -10,6 +10,12 @@ use crate::windowed::{Care, Corner, Grade, Limit, Ramp, Rounds, STEP_S, Spot, Su
 /// window before may brake in less way than a cubic ramp.
 const HASTE: [f64; 4] = [1.0, 1.25, 1.6, 2.2];
 
+/// Distance of places at least, unless the leg is shorter than many of them: with its ends alone, where it turns back on next to no
+/// radius, it would be driven as slowly as these are passed; and at most, mm.
+const MIN_STEP_MM: f64 = 2e-3;
+const STEP_SHARE: f64 = 0.03;
+const MAX_STEP_MM: f64 = 0.3;
+
 /// Roughly: what exceeds a limit is found later.
 const CARE: Care = Care {
     look_s: 1e-3,
@@ -140,9 +146,10 @@ fn spot(
     let (step_cap, knot_mm) = route.step_cap_mm_per_s(at_mm, bounds, &mut cursor.clone());
     let bend = leg.course.counted_length(&at.curvature).max(1e-9);
     let cap = leg.smooth_cap_mm_per_s(&at, bounds);
+    let least_mm = MIN_STEP_MM.min(STEP_SHARE * (leg.end_mm - leg.start_mm));
     let step_mm = (0.15 / bend)
         .min(route.smooth_for_mm(at_mm, cursor))
-        .clamp(2e-3, 0.3);
+        .clamp(least_mm, MAX_STEP_MM);
     let max_mm = if leg.course.is_straight() {
         STEP_S * cap
     } else {
