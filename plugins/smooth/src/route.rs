@@ -196,6 +196,10 @@ impl<const L: usize> Route<L> {
             }
             _ => false,
         };
+        if !joins {
+            // Also where the block, a small loop, has no chord of its own: a run counts either linear or rotary axes.
+            self.rest_behind_last();
+        }
         let mut before = self
             .chords
             .last()
