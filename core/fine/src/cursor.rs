@@ -485,4 +485,34 @@ mod tests {
         probe.stop_on.edge = Edge::Rising;
         assert!(!is_cut(&probe));
     }
+
+    /// Samples show a step that the plan says is there, and that is passed in motion: none where it begins at a rest, and none where
+    /// segments differ by what is no step.
+    #[test]
+    fn a_step_is_met_in_motion_and_where_the_plan_has_one() {
+        let segment = |velocity: f64, flags: SegmentFlags| {
+            let mut segment = Segment::rest(&AxisVector::ZERO, 1.0);
+            segment.coefficients[0][1] = velocity;
+            segment.flags = flags;
+            segment
+        };
+        let plan = [
+            segment(5.0, SegmentFlags::STEPS),
+            segment(7.0, SegmentFlags::default()),
+            segment(10.0, SegmentFlags::STEPS),
+        ];
+        let (mut input, output) = RingBuffer::new(8);
+        for segment in plan {
+            let start_s = 0.0;
+            input.push(Queued::Segment { start_s, segment }).unwrap();
+        }
+        let mut cursor = Cursor::new(output, &AxisVector::ZERO);
+        cursor.advance(0.5, |_| false);
+        assert_eq!(cursor.recent_steps(), Recent::default(), "from rest");
+        cursor.advance(1.0, |_| false);
+        assert_eq!(cursor.recent_steps(), Recent::default(), "without a step");
+        cursor.advance(1.0, |_| false);
+        let met = Steps::between(&plan[1], &plan[2]);
+        assert_eq!(cursor.recent_steps().steps(), met);
+    }
 }

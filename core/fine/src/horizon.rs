@@ -275,4 +275,29 @@ mod tests {
         }
         assert!(risen > 3, "{risen}");
     }
+
+    /// A period takes its points where there is room beside the grid, however many segments it passes.
+    #[test]
+    fn a_period_of_many_short_segments_has_room_for_their_first_points() {
+        const PERIOD_S: f64 = 0.001;
+        let axis = AxisLimits {
+            acceleration_mm_per_s2: 100.0,
+            jerk_mm_per_s3: 1000.0,
+            ..AxisLimits::unlimited()
+        };
+        let (mut input, output) = RingBuffer::new(256);
+        for _ in 0..200 {
+            let mut segment = Segment::rest(&AxisVector::ZERO, PERIOD_S / 100.0);
+            segment.flags = SegmentFlags::default();
+            let start_s = 0.0;
+            input.push(Queued::Segment { start_s, segment }).unwrap();
+        }
+        let mut cursor = Cursor::new(output, &AxisVector::ZERO);
+        cursor.advance(1e-9, |_| false);
+        let mut horizon = Horizon::new(&[axis; MAX_AXES], 2, PERIOD_S);
+        horizon.fill(&cursor.ahead(), PERIOD_S);
+        let points = horizon.iter().count();
+        let room = Horizon::POINTS - Horizon::GRID;
+        assert!((room - 2..=room).contains(&points), "{points} of {room}");
+    }
 }

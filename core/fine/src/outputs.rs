@@ -279,4 +279,18 @@ mod tests {
             );
         }
     }
+
+    /// An event for an axis or a joint that no machine has is one for the last there may be.
+    #[test]
+    fn an_axis_beyond_the_last_is_the_last() {
+        let mut outputs = Outputs::new(false, 0);
+        for kind in [EventKind::Correct, EventKind::HomeByDrive] {
+            for index in [i32::try_from(MAX_AXES).unwrap(), 1000] {
+                outputs.apply(&Event::new(kind, 1, 0, index, 2.0), Waits::default());
+            }
+        }
+        let last = MAX_AXES - 1;
+        assert_eq!(outputs.correction.map(|by| by[last]), Some(4.0));
+        assert_eq!(outputs.hand_over, Some((last, 2.0)));
+    }
 }

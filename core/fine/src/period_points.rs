@@ -191,4 +191,24 @@ mod tests {
         let fastest = points.iter().map(|point| point.velocity[0]);
         assert_eq!(fastest.fold(0.0, f64::max), LOOK_ENTRIES as f64 - 1.0);
     }
+
+    /// Where no time passes inside the plan the place itself is looked at; at a rest of the plan nothing is.
+    #[test]
+    fn a_period_without_time_has_the_point_where_it_is() {
+        let (mut input, output) = RingBuffer::new(2);
+        let mut segment = Segment::rest(&AxisVector::ZERO, 1.0);
+        segment.flags = SegmentFlags::default();
+        segment.coefficients[0] = [0.0, 5.0, 10.0, 0.0, 0.0, 0.0];
+        let start_s = 0.0;
+        input.push(Queued::Segment { start_s, segment }).unwrap();
+        let mut cursor = Cursor::new(output, &AxisVector::ZERO);
+        let mut points = PeriodPoints::new(&[AxisLimits::unlimited(); MAX_AXES], 1);
+        points.fill(&cursor.ahead(), 0.0);
+        assert_eq!(points.iter().count(), 0);
+        cursor.advance(0.25, |_| false);
+        points.fill(&cursor.ahead(), 0.0);
+        let seen: Vec<_> = points.iter().map(|point| point.velocity[0]).collect();
+        assert_eq!(seen, [10.0]);
+        assert_eq!(points.covered_s, 0.0);
+    }
 }

@@ -610,4 +610,32 @@ mod tests {
             assert_eq!(from.way_to_mm(&to), way_mm);
         }
     }
+
+    /// A ring hands its entries out in two pieces: the place goes on from the first into the second, and knows where that ends.
+    #[test]
+    fn a_place_goes_on_over_the_end_of_the_ring() {
+        let segment = |speed: f64| {
+            let mut segment = Segment::rest(&AxisVector::ZERO, 1.0);
+            segment.flags = SegmentFlags::default();
+            segment.path[1] = speed;
+            segment
+        };
+        let queued = [1.0, 2.0, 3.0, 4.0, 5.0].map(|speed| Queued::Segment {
+            start_s: 0.0,
+            segment: segment(speed),
+        });
+        for in_first in 0..=queued.len() {
+            let (first, second) = queued.split_at(in_first);
+            let here = segment(0.0);
+            let mut place = PlanAhead::new(&here, [first, second], TWO_LINEAR).begin(0.5);
+            for speed in [1.0, 2.0, 3.0, 4.0, 5.0] {
+                place.go(1.0);
+                let found = place.pace().map(|pace| pace.speed);
+                assert_eq!(found, Some(speed), "{in_first} in the first");
+            }
+            assert!(place.is_known());
+            place.go(1.0);
+            assert!(place.pace().is_none() && !place.is_known());
+        }
+    }
 }

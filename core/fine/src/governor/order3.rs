@@ -486,6 +486,51 @@ pub(super) mod tests {
         }
     }
 
+    /// To come evenly to the end of the range may take more jerk than there is, though less would have done in this period: that is said.
+    #[test]
+    fn jerk_beyond_the_limit_is_told_where_only_the_end_of_the_range_asks_for_it() {
+        let limits = limits(1000.0, 10_000.0);
+        let segment = along_x([50.0, 0.0, 0.0], 10.0);
+        let mut horizon = Horizon::new(&limits, 2, PERIOD_S);
+        horizon.fill(&Ahead::new(&segment, Some(0.0), 0, None), PERIOD_S);
+        for (from, is_beyond) in [(0.99, true), (0.5, false)] {
+            let mut governor = Governor::new(&limits, 2, PERIOD_S);
+            (governor.sigma, governor.rate_per_s) = (from, 2.5);
+            let chosen = governor.relaxed(&horizon, &Steps::default());
+            let jerk = 50.0 * (governor.rate_per_s() - 2.5) / PERIOD_S;
+            assert_eq!(jerk < -10_000.0, is_beyond, "{jerk} mm/s³ from {from}");
+            assert_eq!(chosen.relaxed, is_beyond, "from {from}");
+        }
+    }
+
+    /// Y is slow to turn round and decides how the rate goes down; of the jerk that it is to have, the plan's own is a part, as it is
+    /// driven at the third power of the rate.
+    #[test]
+    fn the_jerk_of_the_plan_counts_in_the_stop_of_the_slowest_axis() {
+        const SIGMA: f64 = 0.5;
+        let mut limits = limits(1000.0, 1e6);
+        limits[1].jerk_mm_per_s3 = 1000.0;
+        let path = [50.0, 100.0, 0.0];
+        let driven = |jerk: f64| {
+            let mut segment = along_x(path, 0.2);
+            segment.coefficients[1] = [0.0, 0.5, 50.0, jerk / 6.0, 0.0, 0.0];
+            let ahead = Ahead::new(&segment, Some(0.0), 0, None);
+            let mut horizon = Horizon::new(&limits, 2, PERIOD_S);
+            horizon.fill(&ahead, PERIOD_S);
+            let mut governor = Governor::new(&limits, 2, PERIOD_S);
+            (governor.sigma, governor.rate_per_s) = (SIGMA, -0.5);
+            let place = ahead.place(TWO_LINEAR);
+            let change = governor.wanted_by_slowest(&to_rest_from(path), &horizon, &place);
+            SIGMA.powi(3) * jerk + 0.5 * change
+        };
+        let without = driven(0.0);
+        assert!(without.is_finite(), "Y decides");
+        for jerk in [-400.0, 400.0] {
+            let with = driven(jerk);
+            assert!((with - without).abs() < 1e-6, "{with}, {without}");
+        }
+    }
+
     /// Where no way is known a rate becomes constant at once, or by as much as the jerk limit allows; neither is beyond the limit.
     #[test]
     fn a_rate_without_a_way_becomes_constant_within_the_jerk_limit() {

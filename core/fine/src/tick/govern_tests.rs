@@ -229,3 +229,29 @@ fn feeds_ahead_are_looked_at_where_less_is_asked_for_than_is_planned() {
         assert!((found - rate).abs() < 1e-6, "{ratios:?}: {found}");
     }
 }
+
+/// A rapid that is driven at half of its speed was asked for so, until it is; where nothing was, a lower rate is unasked.
+#[test]
+fn a_rate_that_a_lower_ratio_of_rapids_asks_for_is_not_unasked() {
+    let mut rapid = segment([0.0, 20.0, 0.0, 0.0, 0.0, 0.0], 20.0, 1.0);
+    rapid.flags = SegmentFlags::RAPID;
+    for order in [2, 3] {
+        for (ratio, is_unasked) in [(0.5, false), (1.0, true)] {
+            let mut follower = follower(order, &[rapid]);
+            follower.cursor.advance(0.1, |_| false);
+            follower.governor.jump(0.6);
+            let ratios = Ratios {
+                feed: 2.0,
+                mean_feed: 2.0,
+                rapid: ratio,
+            };
+            let chosen = follower.govern(Request {
+                ratios,
+                ..request(Ask::Run)
+            });
+            assert_eq!(chosen.is_unasked, is_unasked, "{order} {ratio}");
+            let sigma = follower.governor.sigma();
+            assert_eq!(sigma > 0.6, is_unasked, "{order} {ratio}: {sigma}");
+        }
+    }
+}

@@ -219,12 +219,11 @@ impl Rate {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rtrb::RingBuffer;
+    use rtrb::{Producer, RingBuffer};
     use tandem_sdk::{AxisLimits, Limits, Segment};
 
-    /// What has been planned for an older epoch, or is not queued yet, starts no motion; a first epoch with nothing in it does.
-    #[test]
-    fn motion_starts_when_that_of_its_own_epoch_is_queued() {
+    /// In front of an empty queue: the way into it, and what is said of it.
+    fn rate() -> (Rate, Producer<Queued>, Arc<Depth>) {
         let axis = AxisLimits {
             min_mm: -1.0,
             max_mm: 1.0,
@@ -235,10 +234,17 @@ mod tests {
             speed_difference_mm_per_s: 0.0,
         };
         let config = FineConfig::new(0.001, Limits::new(&[axis]).unwrap());
-        let (mut queue, segments) = RingBuffer::new(16);
+        let (queue, segments) = RingBuffer::new(16);
         let depth = Arc::new(Depth::default());
         let ratios = RingBuffer::new(16).1;
-        let mut rate = Rate::new(&config, segments, ratios, Arc::clone(&depth));
+        let rate = Rate::new(&config, segments, ratios, Arc::clone(&depth));
+        (rate, queue, depth)
+    }
+
+    /// What has been planned for an older epoch, or is not queued yet, starts no motion; a first epoch with nothing in it does.
+    #[test]
+    fn motion_starts_when_that_of_its_own_epoch_is_queued() {
+        let (mut rate, mut queue, depth) = rate();
         depth.required_s.store(0.0);
         assert!(rate.may_start());
         rate.end_epoch(&AxisVector::ZERO);
@@ -253,5 +259,25 @@ mod tests {
         assert!(rate.may_start());
         depth.wall_s.store(-1.0);
         assert!(!rate.may_start(), "not enough of it");
+    }
+
+    /// A cut waits for the spindle where the machine stands in its midst: that is neither in motion nor at a rest of the plan.
+    #[test]
+    fn the_machine_stands_inside_the_plan_at_a_rate_of_zero_and_away_from_rests() {
+        let (mut rate, mut queue, _) = rate();
+        let (start_s, segment) = (0.0, Segment::rest(&AxisVector::ZERO, 1.0));
+        queue.push(Queued::Segment { start_s, segment }).unwrap();
+        for (sigma, moved_s, stands_inside) in [
+            (1.0, 0.0, false),
+            (0.0, 0.0, false),
+            (0.0, 0.5, true),
+            (0.5, 0.0, false),
+            (0.0, 1.0, false),
+        ] {
+            rate.plan.governor.jump(sigma);
+            rate.advance(moved_s, |_| false);
+            let time_s = rate.cursor().program_time_s();
+            assert_eq!(rate.stands_inside(), stands_inside, "{sigma} at {time_s} s");
+        }
     }
 }

@@ -144,3 +144,26 @@ impl Report {
         status.counts.store(counts);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rtrb::RingBuffer;
+
+    /// A phase is told where the drives give one, beside how many periods went by on old answers.
+    #[test]
+    fn the_phase_of_the_bus_counts_where_the_drives_give_one() {
+        let status = Arc::new(Status::default());
+        let report = Report::new(Arc::clone(&status), RingBuffer::new(1).0);
+        let mut feedback = Feedback::default();
+        for (has_phase, age_periods, old_periods) in [(1, 0, 0), (0, 2, 1), (1, 3, 2)] {
+            (feedback.has_phase, feedback.phase_ns) = (has_phase, 1234);
+            report.tell_bus(&feedback, age_periods);
+            let bus = &status.bus;
+            assert_eq!(bus.has_phase.load(Relaxed), has_phase == 1);
+            assert_eq!(bus.phase_ns.load(Relaxed), 1234);
+            assert_eq!(bus.age_periods.load(Relaxed), age_periods);
+            assert_eq!(bus.old_periods.load(Relaxed), old_periods);
+        }
+    }
+}
