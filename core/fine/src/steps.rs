@@ -157,6 +157,26 @@ mod tests {
         assert!((twice.jerk_mm_per_s3(1, 0.5, 0.001) - 2.0 * jerk).abs() < 1e-6);
     }
 
+    /// One motion in two segments: from 3 to 5 mm/s, and on with the same acceleration.
+    #[test]
+    fn a_motion_that_goes_on_as_it_is_has_no_step() {
+        let segment = |velocity: f64| {
+            let mut segment = Segment::rest(&AxisVector::ZERO, 0.5);
+            segment.coefficients[1] = [0.0, velocity, 2.0, 0.0, 0.0, 0.0];
+            segment
+        };
+        let steps = Steps::between(&segment(3.0), &segment(5.0));
+        assert_eq!(steps.acceleration_mm_per_s2(1, 1.0, 0.001), 0.0);
+        assert_eq!(steps.jerk_mm_per_s3(1, 1.0, 0.001), 0.0);
+        // To a rest there the speed and the acceleration at its end are the step.
+        let steps = Steps::to_rest(&segment(3.0));
+        assert_eq!(steps.acceleration_mm_per_s2(1, 1.0, 0.5), 5.0 / 0.5);
+        assert_eq!(
+            steps.jerk_mm_per_s3(1, 1.0, 0.5),
+            (5.0 / 0.5 + WORST * 4.0) / 0.5
+        );
+    }
+
     /// Segments of 0.5 s on both sides of a step of the acceleration by 8 mm/s² use 900 mm/s³ before it and 100 mm/s³ behind it.
     #[test]
     fn the_jerk_that_the_plan_uses_on_one_side_of_a_step_is_not_left_on_the_other() {

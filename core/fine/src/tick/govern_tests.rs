@@ -255,3 +255,37 @@ fn a_rate_that_a_lower_ratio_of_rapids_asks_for_is_not_unasked() {
         }
     }
 }
+
+/// At twice the feed: what a period begins with is in its mean, and does not make up for its end.
+#[test]
+fn the_feed_is_kept_where_it_is_at_the_end_of_a_period_and_in_its_mean() {
+    for (from, to, is_kept) in [
+        (0.5, 0.5, true),
+        (0.2, 0.4, true),
+        (0.8, 0.4, false),
+        (0.2, 0.6, false),
+        (0.6, 0.6, false),
+    ] {
+        let line = segment([0.0, 10.0, 0.0, 0.0, 0.0, 0.0], 5.0, 1.0);
+        let mut follower = follower(2, &[line]);
+        follower.cursor.advance(0.1, |_| false);
+        follower.governor.jump(from);
+        let found = follower.is_feed_kept(to, &AT_THE_FEED);
+        assert_eq!(found, is_kept, "from {from} to {to}");
+    }
+}
+
+/// A feed is the speed of rotary axes only on a machine that has some: what is limited beside the axes is none.
+#[test]
+fn only_axes_of_the_machine_are_rotary() {
+    let mut limits = AxisLimits::unlimited();
+    limits.acceleration_mm_per_s2 = ACCELERATION;
+    for (linear, rotary) in [(0b111, 0), (0b011, 0b100), (0, 0b111)] {
+        let config = FineConfig {
+            linear,
+            ..FineConfig::new(PERIOD_S, Limits::new(&[limits; 3]).unwrap())
+        };
+        let cursor = Cursor::new(RingBuffer::new(1).1, &AxisVector::ZERO);
+        assert_eq!(PlanFollower::new(&config, cursor).axes.rotary, rotary);
+    }
+}
