@@ -158,7 +158,8 @@ impl Trail {
                     period_s,
                     &mut found,
                 );
-                let at_rest = bound / limit[order - 1];
+                let reached = around.reached[order - 1].min(around.jerk_shown);
+                let at_rest = (reached + steps[order - 1]) / limit[order - 1];
                 if order == PERIODS && around.rests && at_rest > AT_REST {
                     found.take_order(
                         order,
@@ -191,6 +192,8 @@ impl Trail {
             for (most, reached) in around.reached.iter_mut().zip(span.reached[lane]) {
                 *most = most.max(reached);
             }
+            around.jerk_shown +=
+                WORST[2] * span.duration_s / period_s * span.reached[lane][PERIODS - 1];
             if start_s > -(PERIODS as f64) * period_s {
                 for (sum, step) in around.steps.iter_mut().zip(span.steps[lane]) {
                     *sum += step;
@@ -289,6 +292,9 @@ impl Trail {
 #[derive(Clone, Copy, Debug, Default)]
 struct Around {
     reached: [f64; PERIODS],
+    /// What a difference shows of the jerk at most, mm/s³: of a span that is much shorter than a period, in which the motion comes from
+    /// where it rested to the path beside it, next to nothing.
+    jerk_shown: f64,
     steps: [f64; PERIODS],
     /// Whether it moves in feed, and in rapid motion.
     kinds: [bool; 2],
