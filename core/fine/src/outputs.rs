@@ -293,4 +293,16 @@ mod tests {
         assert_eq!(outputs.correction.map(|by| by[last]), Some(4.0));
         assert_eq!(outputs.hand_over, Some((last, 2.0)));
     }
+
+    /// Opening a door switches a spindle that turns, and nothing where none does.
+    #[test]
+    fn a_door_is_what_switched_last_only_where_the_spindle_turns() {
+        for (speed, by) in [(30.0, SwitchedBy::Door), (0.0, SwitchedBy::Program)] {
+            let mut outputs = Outputs::new(false, 0);
+            let spindle = Event::new(EventKind::Spindle, 1, 0, 0, speed);
+            outputs.apply(&spindle, Waits::default());
+            outputs.switch_by_door();
+            assert_eq!(outputs.switched().by, by, "{speed} rad/s");
+        }
+    }
 }

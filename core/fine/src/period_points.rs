@@ -211,4 +211,20 @@ mod tests {
         assert_eq!(seen, [10.0]);
         assert_eq!(points.covered_s, 0.0);
     }
+
+    /// What a segment that begins with a step takes back of it is a part of its acceleration, and what it still is off by none of its
+    /// velocity.
+    #[test]
+    fn a_step_that_is_taken_back_counts_in_the_acceleration_of_a_point() {
+        let mut segment = Segment::rest(&AxisVector::ZERO, 1.0);
+        segment.coefficients[0] = [0.0, 10.0, 3.0, 0.0, 0.0, 0.0];
+        (segment.step_velocity[0], segment.step_acceleration[0]) = (2.0, 4.0);
+        let mut points = PeriodPoints::new(&[AxisLimits::unlimited(); MAX_AXES], 1);
+        points.add(&segment, 0.0, 0.5);
+        let seen: Vec<_> = points
+            .iter()
+            .map(|point| (point.velocity[0], point.acceleration[0]))
+            .collect();
+        assert_eq!(seen, [(8.0, 10.0), (13.0, 10.0)]);
+    }
 }

@@ -315,6 +315,28 @@ mod tests {
         ramp
     }
 
+    /// An axis by itself comes to a rest that is exactly one, in the time of a ramp of its acceleration to its limit and back.
+    #[test]
+    fn an_axis_by_itself_comes_to_rest_and_not_only_near_it() {
+        for velocity in [150.0, 20.0, 0.5, 1e-3, -1e-3, -70.0] {
+            let mut ramp = Ramp {
+                together: None,
+                ..ramp([velocity, 0.0], [0.0; 2], 20_000.0)
+            };
+            let periods = (1..1000).find(|_| {
+                ramp.next();
+                ramp.is_over()
+            });
+            let (most, jerk): (f64, f64) = (800.0, 20_000.0);
+            let peak = most.min((velocity.abs() * jerk).sqrt());
+            let longest = 1.2 * (velocity.abs() / peak + peak / jerk) / ramp.period_s + 5.0;
+            assert!(
+                periods.is_some_and(|periods| f64::from(periods) <= longest),
+                "{velocity} mm/s: {periods:?} periods, {longest} at most"
+            );
+        }
+    }
+
     proptest! {
         /// From any state within the limits, every entry keeps them, and a sum of axes stays their sum.
         #[test]

@@ -292,6 +292,35 @@ mod tests {
         }
     }
 
+    /// A path that gets faster, beyond its feed of 10 mm/s in a piece of 0.01 s: the line of w is that of the piece's middle where this is too
+    /// fast, and that of its end where only this is.
+    #[test]
+    fn what_is_allowed_in_a_piece_is_a_tangent_where_it_is_too_fast() {
+        const PIECE_S: f64 = 0.01;
+        let feeds = Feeds {
+            ratio: 1.0,
+            period_s: 0.0,
+        };
+        let getting_faster = |from: f64, to: f64| {
+            let mut segment = Segment::rest(&AxisVector::ZERO, 1.0);
+            segment.path = [0.0, from, (to - from) / PIECE_S / 2.0, 0.0, 0.0, 0.0];
+            segment.feed_mm_per_s = 10.0;
+            segment.flags = SegmentFlags::default();
+            segment
+        };
+        let segment = getting_faster(20.0, 24.0);
+        let [from, to] = feeds.highest_in(&segment, 0.0, PIECE_S);
+        let middle = (10.0f64 / 22.0).powi(2) / 2.0;
+        assert!((f64::midpoint(from, to) - middle).abs() < 1e-9);
+        let around = [4.9e-3, 5.1e-3].map(|t_s| feeds.highest(&segment, t_s));
+        let slope = (around[1] - around[0]) / 2e-4;
+        assert!(((to - from) / PIECE_S / slope - 1.0).abs() < 1e-4);
+        // Too fast at its end alone: there as much as that place allows.
+        let segment = getting_faster(8.0, 11.0);
+        let found = feeds.highest_in(&segment, 0.0, PIECE_S);
+        assert_eq!(found, [MOST, feeds.highest(&segment, PIECE_S)]);
+    }
+
     /// Twice as fast as the feed on the whole of a segment: half the rate everywhere on it, to its end, and nothing is known behind it.
     #[test]
     fn the_rate_is_low_to_the_end_of_what_is_too_fast() {

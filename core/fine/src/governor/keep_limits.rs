@@ -409,6 +409,20 @@ mod tests {
         assert!((high / expected - 1.0).abs() < 0.05, "{high}, {expected}");
     }
 
+    /// What comes next of a way is known before it is driven, to its end.
+    #[test]
+    fn a_way_says_what_it_does_next() {
+        let mut way = Recovery::new();
+        assert_eq!(way.peek(), None);
+        way.push(5.0);
+        way.push(-3.0);
+        for (change, is_last) in [(5.0, false), (-3.0, true)] {
+            assert_eq!(way.peek(), Some(change));
+            assert_eq!(way.next(), Some((change, is_last)));
+        }
+        assert_eq!((way.peek(), way.next()), (None, None));
+    }
+
     proptest! {
         /// σ̈ at either end of the range keeps jerk and acceleration of both axes at every instant of the period, up to what the
         /// plan itself takes of them; and one of them is used up, so that no more could be taken.

@@ -289,3 +289,32 @@ fn only_axes_of_the_machine_are_rotary() {
         assert_eq!(PlanFollower::new(&config, cursor).axes.rotary, rotary);
     }
 }
+
+/// A stop has most of the deceleration that the queue leaves, in proportion to it.
+#[test]
+fn a_stop_brakes_with_a_share_of_what_the_queue_leaves() {
+    let mut follower = follower(2, &[]);
+    let mut brakes_with = |stop_deceleration_mm_per_s2: f64| {
+        follower.request = Request {
+            stop_deceleration_mm_per_s2,
+            ..request(Ask::Stop)
+        };
+        follower.along().max_mm_per_s2 / stop_deceleration_mm_per_s2
+    };
+    let share = brakes_with(1000.0);
+    assert!((0.9..1.0).contains(&share), "{share}");
+    assert!((brakes_with(1.0) - share).abs() < 1e-9);
+}
+
+/// The plan passes a hump within the period that begins at the feed: it is to end so low that its mean keeps the feed.
+#[test]
+fn a_period_that_begins_at_the_feed_keeps_it_in_its_mean() {
+    // From 10 mm/s by way of 13 mm/s to 10 mm/s.
+    let hump = segment([0.0, 10.0, 6000.0, -4e6, 0.0, 0.0], 10.0, 0.0012);
+    let mut follower = follower(2, &[hump]);
+    follower.cursor.advance(1e-9, |_| false);
+    let sigma = follower.ratio_target(&AT_THE_FEED, f64::INFINITY);
+    let way_mm = hump.path_mm(f64::midpoint(1.0, sigma) * PERIOD_S);
+    let mean_mm_per_s = way_mm / PERIOD_S;
+    assert!((9.8..10.01).contains(&mean_mm_per_s), "{mean_mm_per_s}");
+}

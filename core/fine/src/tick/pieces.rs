@@ -188,4 +188,22 @@ mod tests {
         };
         assert!(near(target(&stands, 0.9, f64::INFINITY), 1.0));
     }
+
+    /// At the feed itself, and a rounding above it, a piece is still asked for its mean; what is clearly above only for its end.
+    #[test]
+    fn a_piece_that_begins_at_the_feed_keeps_it_in_its_mean() {
+        let bounds = Bounds {
+            ratios: &Ratios {
+                feed: 0.6,
+                mean_feed: 0.6,
+                rapid: 1.0,
+            },
+            way_speed_mm_per_s: f64::INFINITY,
+            limit: 1.0,
+        };
+        for (sigma, expected) in [(0.6, 0.0), (0.600_001, 0.0), (0.62, 0.6)] {
+            let found = piece_target(&hump(), 0.0, 0.001, sigma, &bounds);
+            assert!((found - expected).abs() < 1e-9, "from {sigma}: {found}");
+        }
+    }
 }
