@@ -137,7 +137,7 @@ impl Governor {
 
 #[cfg(test)]
 mod tests {
-    use super::super::order3;
+    use super::super::{Goal, order3};
     use super::*;
     use crate::plan_ahead::{Ahead, Axes, PlanAhead};
     use crate::steps::Recent;
@@ -202,6 +202,40 @@ mod tests {
         let mut moves = Segment::rest(&AxisVector::ZERO, 0.1);
         (moves.coefficients[0][1], moves.path[1]) = (5.0, 5.0);
         assert!(!stands(&moves, 0.05));
+    }
+
+    /// A hold may have come in a dwell, which has no speed to say how fast it is to pass: its rate goes up again to what is asked for.
+    #[test]
+    fn a_dwell_passes_on_after_a_hold_in_it() {
+        let limits = order3::tests::limits(1000.0, 10_000.0);
+        let dwell = Segment::rest(&AxisVector::ZERO, 10.0);
+        let ahead = Ahead::new(&dwell, Some(1.0), 0, None);
+        let mut horizon = Horizon::new(&limits, 2, PERIOD_S);
+        horizon.fill(&ahead, PERIOD_S);
+        for (ratio, sigma, rises) in [
+            (1.0, 0.0, true),
+            (1.0, 0.5, true),
+            (1.0, 1.0, false),
+            (0.5, 0.25, true),
+            (0.5, 0.5, false),
+        ] {
+            let mut governor = Governor::new(&limits, 2, PERIOD_S);
+            governor.jump(sigma);
+            let here = RateState {
+                sigma,
+                rate_per_s: 0.0,
+                place: ahead.place(X_AND_A),
+                recent: Recent::default(),
+            };
+            let aim = Aim {
+                goal: Goal::run(1.0, 10.0, None),
+                ratio,
+                kept_rate: 1.0,
+                path: [0.0; 3],
+            };
+            let wanted = governor.wanted_below(&aim, &horizon, &here);
+            assert_eq!(wanted > 0.0, rises, "{sigma} of {ratio}: {wanted}");
+        }
     }
 
     /// Below the feed the mean of a period counts as well, with all that the plan gains in it; above it the speed bends to the feed.
