@@ -300,4 +300,28 @@ mod tests {
         let room = Horizon::POINTS - Horizon::GRID;
         assert!((room - 2..=room).contains(&points), "{points} of {room}");
     }
+
+    /// A plan that turns or gets faster by next to nothing of what its axes have goes straight on.
+    #[test]
+    fn straight_on_is_what_uses_next_to_nothing_of_the_limits() {
+        let axis = AxisLimits {
+            acceleration_mm_per_s2: 100.0,
+            jerk_mm_per_s3: 1000.0,
+            ..AxisLimits::unlimited()
+        };
+        for (acceleration_share, jerk_share, is_steady) in [
+            (0.0, 0.0, true),
+            (0.5, 0.5, true),
+            (1.5, 0.0, false),
+            (0.0, 1.5, false),
+        ] {
+            let mut segment = Segment::rest(&AxisVector::ZERO, 1e-3);
+            let acceleration = acceleration_share * STRAIGHT_ON_SHARE * 100.0;
+            let jerk = jerk_share * STRAIGHT_ON_SHARE * 1000.0;
+            segment.coefficients[1] = [0.0, 10.0, acceleration / 2.0, jerk / 6.0, 0.0, 0.0];
+            let mut horizon = Horizon::new(&[axis; MAX_AXES], 2, 1e-3);
+            horizon.fill(&Ahead::new(&segment, Some(0.0), 0, None), 1e-3);
+            assert_eq!(horizon.is_steady(), is_steady, "{acceleration}, {jerk}");
+        }
+    }
 }

@@ -312,4 +312,29 @@ mod tests {
             assert_eq!(LineEnd::default().look(&mut cursor, 0.0), expected);
         }
     }
+
+    /// A feed that is lower with every mm, seen ten of them ahead: more marks come past than there is room for at once.
+    #[test]
+    fn the_marks_ahead_are_those_not_yet_passed_however_many_have_been() {
+        const SEGMENTS: u32 = 200;
+        let (mut input, output) = RingBuffer::new(SEGMENTS as usize);
+        for number in 0..SEGMENTS {
+            let start_s = f64::from(number);
+            let mut segment = Segment::rest(&AxisVector::ZERO, 1.0);
+            segment.flags = SegmentFlags::default();
+            (segment.path[0], segment.path[1]) = (start_s, 1.0);
+            segment.feed_mm_per_s = f64::from(2 * SEGMENTS - number);
+            input.push(Queued::Segment { start_s, segment }).unwrap();
+        }
+        let mut cursor = Cursor::new(output, &AxisVector::ZERO);
+        let mut slowdowns = Slowdowns::new();
+        cursor.advance(0.5, |_| false);
+        for number in 0..SEGMENTS - 10 {
+            slowdowns.extend(&mut cursor, f64::from(number) + 10.0);
+            let seen: Vec<_> = slowdowns.marks().map(|mark| mark.path_mm).collect();
+            let expected: Vec<_> = (1..=10).map(|n| f64::from(number + n)).collect();
+            assert_eq!(seen, expected);
+            cursor.advance(1.0, |_| false);
+        }
+    }
 }

@@ -409,6 +409,43 @@ mod tests {
         assert!((high / expected - 1.0).abs() < 0.05, "{high}, {expected}");
     }
 
+    /// A step of the plan counts as soon as a rate that rises may come to it while samples show this period; one that falls may not.
+    #[test]
+    fn a_step_is_looked_for_as_far_as_a_rising_rate_comes() {
+        let mut first = Segment::rest(&AxisVector::ZERO, 0.01);
+        first.coefficients[0][1] = 5.0;
+        first.flags = SegmentFlags::default();
+        let mut second = first;
+        second.coefficients[0][1] = 7.0;
+        second.flags = SegmentFlags::STEPS;
+        let start_s = first.duration_s;
+        let step = Steps::between(&first, &second);
+        let queued = [Queued::Segment {
+            start_s,
+            segment: second,
+        }];
+        let ways = WaySearch::new(PERIOD_S);
+        // At half the rate half a period passes in each; up to nearly the whole rate, nearly a whole one.
+        for (rate_per_s, periods_ahead, is_seen) in [
+            (0.0, 1.4, true),
+            (0.0, 1.6, false),
+            (100.0, 2.3, true),
+            (100.0, 2.5, false),
+            (-100.0, 1.4, true),
+            (-100.0, 1.6, false),
+        ] {
+            let from_s = first.duration_s - periods_ahead * PERIOD_S;
+            let reserve = ways.reserve(&RateState {
+                sigma: 0.5,
+                rate_per_s,
+                place: PlanAhead::new(&first, [&queued, &[]], TWO_LINEAR).begin(from_s),
+                recent: Recent::default(),
+            });
+            let expected = if is_seen { step } else { Steps::default() };
+            assert_eq!(reserve, expected, "{rate_per_s} {periods_ahead}");
+        }
+    }
+
     /// What comes next of a way is known before it is driven, to its end.
     #[test]
     fn a_way_says_what_it_does_next() {

@@ -206,4 +206,20 @@ mod tests {
             assert!((found - expected).abs() < 1e-9, "from {sigma}: {found}");
         }
     }
+
+    /// Over no time there is no mean: only the end is asked for.
+    #[test]
+    fn a_piece_without_time_is_asked_for_its_end() {
+        let ratios = Ratios {
+            feed: 0.5,
+            mean_feed: 0.5,
+            rapid: 1.0,
+        };
+        let bounds = Bounds {
+            ratios: &ratios,
+            way_speed_mm_per_s: f64::INFINITY,
+            limit: 1.0,
+        };
+        assert_eq!(piece_target(&hump(), 0.0, 0.0, 0.4, &bounds), 0.5);
+    }
 }
