@@ -335,4 +335,37 @@ mod tests {
         assert!(plain().is_like(&plain()) && doubled().is_like(&doubled()));
         assert!(!plain().is_like(&doubled()) && !doubled().is_like(&plain()));
     }
+
+    /// On the way to rest after a fault the kinematics lead as long as every joint can follow; where one cannot, each goes by itself. Before
+    /// a fault the guard is who says so.
+    #[test]
+    fn after_a_fault_each_joint_has_to_be_able_to_follow() {
+        let axis = AxisLimits {
+            acceleration_mm_per_s2: 1000.0,
+            ..AxisLimits::unlimited()
+        };
+        let config = FineConfig {
+            joints: Joints::Curved { axes: 2 },
+            ..FineConfig::new(0.001, Limits::new(&[axis; 4]).unwrap())
+        };
+        // From a standstill a joint gets a µm far in a period.
+        let guard = Guard::new(&config);
+        for (axes, after_fault, leads) in [
+            ([0.0004, 0.0004], true, true),
+            ([10.0, 0.0], true, false),
+            ([0.0, 10.0], true, false),
+            ([10.0, 0.0], false, true),
+        ] {
+            let mut space = JointSpace::new(&config, Some(Box::new(Doubled)));
+            let mut position = AxisVector::from_slice(&axes);
+            let fault = space.add_joints(&config, &guard, after_fault, 2, &mut position);
+            assert_eq!(fault, None);
+            let joints = if leads {
+                axes.map(|axis| 2.0 * axis)
+            } else {
+                [0.0; 2]
+            };
+            assert_eq!(position.0[2..4], joints, "{axes:?}");
+        }
+    }
 }
