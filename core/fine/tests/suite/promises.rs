@@ -123,6 +123,27 @@ fn missed_periods_count_for_the_keep_alive_and_are_counted_to_one() {
     assert!(bench.host.controls.jog.let_go.load(Relaxed));
 }
 
+/// One that another may follow leaves the drives enabled; the last one is done when they have let go.
+#[test]
+fn a_job_is_done_when_its_program_has_ended_and_it_keeps_no_drives_that_it_is_to_let_go() {
+    for stays in [true, false] {
+        let mut bench = Bench::new(GuardMode::Stop);
+        if stays {
+            bench.fine.stay();
+        }
+        bench.peak(20.0);
+        bench.dwell(0.01);
+        bench.event(EventKind::ProgramEnd, 0, 0.0);
+        for _ in 0..400 {
+            let fine = &bench.fine;
+            let is_done = fine.has_ended() && (stays || fine.is_over());
+            assert_eq!(fine.is_done(), is_done, "stays enabled: {stays}");
+            tick(&mut bench, 1);
+        }
+        assert!(bench.fine.is_done() && bench.fine.is_over() != stays);
+    }
+}
+
 #[test]
 fn a_job_takes_over_the_drives_of_the_one_before_while_they_hold() {
     let mut first = Bench::new(GuardMode::Stop);
