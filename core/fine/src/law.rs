@@ -301,4 +301,19 @@ mod tests {
             f64::INFINITY
         );
     }
+
+    /// Braking already, but with less than what brings the speed down in the end: it brakes a little more before it eases.
+    #[test]
+    fn a_way_with_a_little_more_braking_than_there_is_takes_its_time() {
+        let along = Along {
+            speed_mm_per_s: 10.0,
+            acceleration_mm_per_s2: -1.0,
+            max_mm_per_s2: 2.0,
+            jerk_mm_per_s3: 10.0,
+        };
+        // To ease from 1 mm/s² alone takes 0.05 mm/s: the 0.06 need √1.1 mm/s² first.
+        let time_s = (2.0 * 1.1f64.sqrt() - 1.0) / 10.0;
+        let mean = along.way_to_mm(9.94) / time_s;
+        assert!((9.94..10.0).contains(&mean), "{mean} mm/s");
+    }
 }

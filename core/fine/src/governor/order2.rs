@@ -101,6 +101,15 @@ mod tests {
         }
     }
 
+    /// At the limit already, and about to rise beyond it: there is no room, though nothing changes yet.
+    #[test]
+    fn a_rise_from_the_limit_crosses_it_at_once() {
+        assert_eq!(crossing(0.0, 0.0, 1.0), 0.0);
+        assert_eq!(crossing(0.0, 1.0, 0.0), 0.0);
+        assert_eq!(crossing(0.0, 0.0, 0.0), f64::INFINITY);
+        assert_eq!(crossing(0.0, 0.0, -1.0), f64::INFINITY);
+    }
+
     proptest! {
         #[test]
         fn the_crossing_is_the_first(gap in 0.0..10.0f64, slope in -5.0..5.0f64, curve in -5.0..5.0f64) {

@@ -362,6 +362,22 @@ mod tests {
     use proptest::prelude::*;
     use tandem_sdk::{AxisLimits, AxisVector, MAX_AXES, Segment, derivatives};
 
+    /// A way begins with single periods, and the farther it is, the more of them it takes in a step: no step is a large share of it.
+    #[test]
+    fn the_steps_of_a_way_grow_with_it() {
+        const MOST: u32 = 2000;
+        let (mut passed, mut steps) = (0, 0);
+        while passed < MOST {
+            let periods = periods_of_step(passed);
+            assert!(
+                periods == 1 || 4 * periods <= passed,
+                "{periods} behind {passed}"
+            );
+            (passed, steps) = (passed + periods, steps + 1);
+        }
+        assert!(4 * steps < MOST, "{steps} steps");
+    }
+
     /// X is slower than Y.
     fn limits(acceleration: f64, slower: f64, jerk: f64) -> [AxisLimits; MAX_AXES] {
         let mut limits = order3::tests::limits(acceleration, jerk);

@@ -222,4 +222,21 @@ mod tests {
         };
         assert_eq!(piece_target(&hump(), 0.0, 0.0, 0.4, &bounds), 0.5);
     }
+
+    /// At half the rate a piece takes twice its time; the last one goes as far as what is left of the period lets it.
+    #[test]
+    fn pieces_take_their_time_of_the_period_by_the_mean_rate() {
+        let mut laid = Laid {
+            sigma: 0.5,
+            left_s: 0.010,
+            passed_s: 0.0,
+        };
+        laid.pass(0.002, 0.5, 0.0);
+        laid.pass(0.001, 0.3, 0.0);
+        assert!((laid.left_s - 0.0035).abs() < 1e-12, "{laid:?}");
+        assert!((laid.passed_s - 0.003).abs() < 1e-12, "{laid:?}");
+        laid.pass(1.0, 0.7, 0.007);
+        assert!((laid.sigma - 0.5).abs() < 1e-12 && laid.left_s == 0.0);
+        assert!((laid.passed_s - 0.003 - 0.4 * 0.0035).abs() < 1e-12);
+    }
 }
