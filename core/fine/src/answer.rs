@@ -364,4 +364,27 @@ mod tests {
             Some(FaultKind::Drive { joint: 1, code: 9 })
         );
     }
+
+    /// How far off a joint is does not depend on where it is, nor on the side that it is off to.
+    #[test]
+    fn an_error_is_the_way_from_what_was_sent_to_what_is_reported() {
+        let max_mm = AxisVector([0.1; MAX_AXES]);
+        for sent_mm in [-5.0, 0.0, 5.0] {
+            let sent = History::new(&AxisVector([sent_mm; MAX_AXES]));
+            for (off_mm, is_fault) in [(0.05, false), (-0.05, false), (0.25, true), (-0.25, true)] {
+                let feedback = Feedback {
+                    position: AxisVector([sent_mm + off_mm; MAX_AXES]),
+                    state: [JointState::Enabled; MAX_AXES],
+                    ..Feedback::default()
+                };
+                let fault = following(&feedback, (&sent, &[0; MAX_AXES]), 3, &max_mm, 0);
+                let expected = is_fault.then_some(FaultKind::Following {
+                    joint: 0,
+                    error_mm: 0.25,
+                    limit_mm: 0.1,
+                });
+                assert_eq!(fault, expected, "{off_mm} from {sent_mm}");
+            }
+        }
+    }
 }
