@@ -366,6 +366,15 @@ mod tests {
                 [0.0; 2]
             };
             assert_eq!(position.0[2..4], joints, "{axes:?}");
+            // Once each goes by itself the kinematics are not asked before the machine begins anew.
+            let next_joint = |space: &mut JointSpace| {
+                let mut position = AxisVector::from_slice(&[0.0004, 0.0004]);
+                space.add_joints(&config, &guard, true, 2, &mut position);
+                position[2]
+            };
+            assert_eq!(next_joint(&mut space), if leads { 0.0008 } else { 0.0 });
+            space.lead_again();
+            assert_eq!(next_joint(&mut space), 0.0008);
         }
     }
 }
