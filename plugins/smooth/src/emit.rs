@@ -5,6 +5,7 @@ use tandem_motion::stream::{Blocks, Emitted};
 use tandem_sdk::{MAX_AXES, Segment, SegmentFlags, SegmentSink};
 
 use crate::core::PathAhead;
+use crate::frame::{dot, minus};
 use crate::report::{of_leg, path};
 use crate::route::{Item, Leg};
 
@@ -12,6 +13,8 @@ use crate::route::{Item, Leg};
 const STOP_JERK: f64 = 0.5;
 /// Least duration of a segment, s: the derivatives of a shorter one are rounding.
 const MIN_S: f64 = 5e-5;
+/// Fine periods by which the marks may be off where the motion passes the end of a leg: where they are more off it is not near that end.
+const MAX_OFF_PERIODS: f64 = 4.0;
 
 /// The path coordinate of what was emitted.
 #[derive(Debug, Default)]
@@ -83,7 +86,7 @@ impl<const L: usize> PathAhead<L> {
         let mut ends = false;
         while let Some(leg) = self.route.front() {
             let end_s = if leg.end < self.window.end() - 1e-9 {
-                self.window.time_of(leg.end)
+                self.over_s(leg.end)
             } else {
                 f64::INFINITY
             };
@@ -124,6 +127,24 @@ impl<const L: usize> PathAhead<L> {
         Emitted {
             until_s,
             duration_s: segment.duration_s,
+        }
+    }
+
+    /// When the motion is over the leg in front, which ends at the path coordinate `end`. Between two marks that is an even pace, and the
+    /// motion may be a period off; where the feed is lower behind it, it is when the motion passes the end of the leg.
+    fn over_s(&self, end: f64) -> f64 {
+        let about_s = self.window.time_of(end);
+        let Some(chord) = self.route.last_before_lower_feed() else {
+            return about_s;
+        };
+        let [position, velocity, _] = self.window.state(about_s);
+        let left = dot(&minus(&chord.at(end), &position), &chord.direction);
+        let speed = dot(&velocity, &chord.direction);
+        let most_s = MAX_OFF_PERIODS * self.frame.period_s;
+        if left.abs() < most_s * speed {
+            about_s + left / speed
+        } else {
+            about_s
         }
     }
 

@@ -166,6 +166,18 @@ impl<const L: usize> Route<L> {
         }
     }
 
+    /// The last chord of the leg in front, where the leg behind it has a lower feed.
+    pub fn last_before_lower_feed(&self) -> Option<&Chord<L>> {
+        let leg = self.front()?;
+        let Some(Item::Leg(next)) = self.items.get(1) else {
+            return None;
+        };
+        let falls = next.block.command_feed_mm_per_s() < leg.block.command_feed_mm_per_s();
+        let behind = (leg.first_chord + u64::from(leg.chords)).checked_sub(self.first)?;
+        let last = (behind as usize).checked_sub(1)?;
+        self.chords.get(last).filter(|_| falls)
+    }
+
     /// Takes a rest.
     pub fn push_dwell(&mut self, block: &Block) {
         self.rest_behind_last();
