@@ -498,7 +498,9 @@ mod tests {
                     let t = PERIOD_S * f64::from(step) / 200.0;
                     let (now, turned) = (sigma + t * (rate + t * change / 2.0), rate + t * change);
                     let local_s = from_s + t * (sigma + t * (rate / 2.0 + t * change / 6.0));
-                    let (segment, local_s) = if local_s < first.duration_s {
+                    // σ̈ moves the end of the period by a thousandth of it: of a segment that it comes to only so no sample shows anything.
+                    let looked_s = from_s + t * (sigma + t * rate / 2.0);
+                    let (segment, local_s) = if looked_s < first.duration_s + NONE_S {
                         (&first, local_s)
                     } else {
                         (&second, local_s - first.duration_s)
@@ -512,9 +514,8 @@ mod tests {
                         most = most.max(used).max(driven.abs() / ACCELERATION);
                     }
                 }
-                // What σ̈ changes of σ within the period is left out, which is 3 % of a limit in one of some ten thousand draws.
-                prop_assert!(most < 1.05, "{most} of a limit is used");
-                prop_assert!(most > 0.8, "only {most} of a limit is used");
+                prop_assert!(most < 1.02, "{most} of a limit is used");
+                prop_assert!(most > 0.95, "only {most} of a limit is used");
             }
         }
     }

@@ -434,6 +434,17 @@ pub(super) mod tests {
         segment
     }
 
+    /// A governor of a machine of 1000 mm/s² and 10 000 mm/s³ at the start of `segment`, at this rate, and what it looks at.
+    fn governor_on(segment: &Segment, sigma: f64, rate_per_s: f64) -> (Governor, Horizon) {
+        let limits = limits(1000.0, 10_000.0);
+        let mut governor = Governor::new(&limits, 2, PERIOD_S);
+        governor.sigma = sigma;
+        governor.rate_per_s = rate_per_s;
+        let mut horizon = Horizon::new(&limits, 2, PERIOD_S);
+        horizon.fill(&Ahead::new(segment, Some(0.0), 0, None), PERIOD_S);
+        (governor, horizon)
+    }
+
     fn to_rest_from(path: [f64; 3]) -> Aim {
         Aim {
             goal: Goal::Rest { sigma: 1.0 },
@@ -447,13 +458,9 @@ pub(super) mod tests {
     /// more jerk than there is.
     #[test]
     fn where_both_cannot_be_kept_acceleration_is_kept_and_jerk_goes_beyond_its_limit() {
-        let limits = limits(1000.0, 10_000.0);
         let (speed, acceleration) = (50.0, 1000.0);
         let segment = along_x([speed, acceleration, 0.0], 0.1);
-        let mut governor = Governor::new(&limits, 2, PERIOD_S);
-        (governor.sigma, governor.rate_per_s) = (0.95, 2.5);
-        let mut horizon = Horizon::new(&limits, 2, PERIOD_S);
-        horizon.fill(&Ahead::new(&segment, Some(0.0), 0, None), PERIOD_S);
+        let (mut governor, horizon) = governor_on(&segment, 0.95, 2.5);
         let chosen = governor.relaxed(&horizon, &Steps::default());
         assert!(chosen.relaxed);
         let (sigma, rate) = (governor.sigma(), governor.rate_per_s());
@@ -467,13 +474,9 @@ pub(super) mod tests {
     #[test]
     fn the_rate_comes_to_an_end_of_its_range_without_a_step() {
         const SPEED: f64 = 50.0;
-        let limits = limits(1000.0, 10_000.0);
         let segment = along_x([SPEED, 0.0, 0.0], 10.0);
-        let mut horizon = Horizon::new(&limits, 2, PERIOD_S);
-        horizon.fill(&Ahead::new(&segment, Some(0.0), 0, None), PERIOD_S);
         for (from, rate, end) in [(0.99, 2.5, 1.0), (0.01, -2.5, 0.0)] {
-            let mut governor = Governor::new(&limits, 2, PERIOD_S);
-            (governor.sigma, governor.rate_per_s) = (from, rate);
+            let (mut governor, horizon) = governor_on(&segment, from, rate);
             for _ in 0..20 {
                 let before = governor.rate_per_s();
                 governor.relaxed(&horizon, &Steps::default());
@@ -489,13 +492,9 @@ pub(super) mod tests {
     /// To come evenly to the end of the range may take more jerk than there is, though less would have done in this period: that is said.
     #[test]
     fn jerk_beyond_the_limit_is_told_where_only_the_end_of_the_range_asks_for_it() {
-        let limits = limits(1000.0, 10_000.0);
         let segment = along_x([50.0, 0.0, 0.0], 10.0);
-        let mut horizon = Horizon::new(&limits, 2, PERIOD_S);
-        horizon.fill(&Ahead::new(&segment, Some(0.0), 0, None), PERIOD_S);
         for (from, is_beyond) in [(0.99, true), (0.5, false)] {
-            let mut governor = Governor::new(&limits, 2, PERIOD_S);
-            (governor.sigma, governor.rate_per_s) = (from, 2.5);
+            let (mut governor, horizon) = governor_on(&segment, from, 2.5);
             let chosen = governor.relaxed(&horizon, &Steps::default());
             let jerk = 50.0 * (governor.rate_per_s() - 2.5) / PERIOD_S;
             assert_eq!(jerk < -10_000.0, is_beyond, "{jerk} mm/s³ from {from}");
@@ -534,10 +533,7 @@ pub(super) mod tests {
     /// Where no way is known a rate becomes constant at once, or by as much as the jerk limit allows; neither is beyond the limit.
     #[test]
     fn a_rate_without_a_way_becomes_constant_within_the_jerk_limit() {
-        let limits = limits(1000.0, 10_000.0);
         let segment = along_x([50.0, 0.0, 0.0], 0.2);
-        let mut horizon = Horizon::new(&limits, 2, PERIOD_S);
-        horizon.fill(&Ahead::new(&segment, Some(0.0), 0, None), PERIOD_S);
         // In a period 10 000 mm/s³ change a rate along 50 mm/s by 0.2 per second.
         let most = ORDER3_LIMIT_SHARE * 0.2;
         for (rate, expected) in [
@@ -546,8 +542,7 @@ pub(super) mod tests {
             (0.5, 0.5 - most),
             (-0.5, most - 0.5),
         ] {
-            let mut governor = Governor::new(&limits, 2, PERIOD_S);
-            (governor.sigma, governor.rate_per_s) = (0.5, rate);
+            let (mut governor, horizon) = governor_on(&segment, 0.5, rate);
             let chosen = governor.relaxed(&horizon, &Steps::default());
             assert!(!chosen.relaxed, "{rate}");
             let found = governor.rate_per_s();
@@ -589,13 +584,8 @@ pub(super) mod tests {
     /// At half the rate on a plan of 50 mm/s that starts with this acceleration and jerk: what is driven of jerk along the path, mm/s³, by what
     /// is wanted to keep a feed, mm/s, while the rate changes by `rate_per_s`.
     fn wanted_path_jerk(feed: f64, rate_per_s: f64, [acceleration, jerk]: [f64; 2]) -> (f64, f64) {
-        let limits = limits(1000.0, 10_000.0);
         let path = [50.0, acceleration, jerk];
-        let segment = along_x(path, 0.2);
-        let mut horizon = Horizon::new(&limits, 2, PERIOD_S);
-        horizon.fill(&Ahead::new(&segment, Some(0.0), 0, None), PERIOD_S);
-        let mut governor = Governor::new(&limits, 2, PERIOD_S);
-        (governor.sigma, governor.rate_per_s) = (0.5, rate_per_s);
+        let (governor, horizon) = governor_on(&along_x(path, 0.2), 0.5, rate_per_s);
         let goal = Goal::run(1.0, feed, None);
         let change = governor.wanted(
             &Aim {
@@ -632,12 +622,7 @@ pub(super) mod tests {
 
     /// What is wanted from `sigma` on to a rate of 1 along a plan that starts like `path`, and what the law of the rate says.
     fn wanted_and_law(sigma: f64, feed_mm_per_s: f64, path: [f64; 3]) -> (f64, f64) {
-        let limits = limits(1000.0, 10_000.0);
-        let segment = along_x(path, 0.2);
-        let mut horizon = Horizon::new(&limits, 2, PERIOD_S);
-        horizon.fill(&Ahead::new(&segment, Some(0.0), 0, None), PERIOD_S);
-        let mut governor = Governor::new(&limits, 2, PERIOD_S);
-        governor.sigma = sigma;
+        let (governor, horizon) = governor_on(&along_x(path, 0.2), sigma, 0.0);
         let aim = Aim {
             goal: Goal::run(1.0, feed_mm_per_s, None),
             ..to_rest_from(path)
