@@ -465,6 +465,43 @@ mod tests {
         assert!((rate - expected).abs() < 0.01, "{rate}, not {expected}");
     }
 
+    /// A plan that uses all of the jerk leaves some of it once it is a fifth slower: what a stop then takes to begin counts above
+    /// that rate only.
+    #[test]
+    fn what_a_stop_takes_to_begin_lowers_the_rate_only_where_the_plan_leaves_no_jerk() {
+        const JERK: f64 = 1e5;
+        let mut easing = Easing::NONE;
+        easing.count(0, JERK);
+        let rate_of = |pieces: u32, easing: Easing| {
+            let mut depth = QueueDepth::new(0.01, 0.001, 1.0, easing);
+            for piece in 1..=pieces {
+                let mut segment = level(50.0, 100.0);
+                (segment.duration_s, segment.flags) = (0.002, SegmentFlags::default());
+                if piece == pieces {
+                    segment.order = 3;
+                    (segment.coefficients[0][1], segment.coefficients[0][3]) = (50.0, -JERK / 6.0);
+                }
+                depth.push(&segment, f64::from(piece) * 0.002);
+            }
+            let rate = depth.rate_for_wall(0.0, f64::from(pieces) * 0.002);
+            (rate, depth.build_up_s())
+        };
+        let at_rate = |queued_s: f64, before_s: f64| {
+            let half = 2.0 * STOP_SHARE * before_s;
+            (half * half + 4.0 * STOP_SHARE * queued_s).sqrt() - half
+        };
+        let (whole, easing_s) = rate_of(200, easing);
+        assert!((0.03..0.1).contains(&easing_s), "{easing_s}");
+        assert_eq!(whole, 1.0);
+        let queued_s = 0.3;
+        let (rate, _) = rate_of(150, easing);
+        let expected = at_rate(queued_s, 0.033 + easing_s);
+        assert!((0.82..0.98).contains(&expected), "{expected}");
+        assert!((rate - expected).abs() < 0.01, "{rate}, not {expected}");
+        let slow = [easing, Easing::NONE].map(|easing| rate_of(80, easing).0);
+        assert!(slow[0] < 0.8 && slow[0] == slow[1], "{slow:?}");
+    }
+
     #[test]
     fn a_queue_that_leaves_nothing_to_brake_with_is_still_driven_out_of() {
         let mut depth = QueueDepth::new(0.01, 0.001, 1.0, Easing::NONE);

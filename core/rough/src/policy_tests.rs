@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex};
 
 use super::*;
-use crate::doubles::{Script, block, probe, rest};
+use crate::doubles::{Answer, Script, block, probe, rest};
 use tandem_gcode::{Input, InputMode, InputWait};
 use tandem_sdk::{Curve, Event, EventKind};
 
@@ -242,4 +242,14 @@ fn more_can_come_from_a_window_or_from_the_source() {
     assert!(source.may_go_on(true));
     source.next_items(&mut vec![]).unwrap();
     assert!(source.may_go_on(false), "six blocks are left of what came");
+}
+
+#[test]
+fn what_an_input_has_answered_reaches_the_program_behind_a_policy() {
+    let script = Script::of(vec![Ok(vec![wait()])]);
+    let told = Arc::clone(&script.told);
+    let mut source = Tuned::new(script, Recorder::default());
+    source.next_items(&mut vec![]).unwrap();
+    source.provide_input(-1.0);
+    assert_eq!(*told.lock().unwrap(), [Answer::Input(-1.0)]);
 }

@@ -112,6 +112,42 @@ fn a_rough_period_asks_for_the_depth_and_for_no_more() {
     }
 }
 
+/// What was emitted counts by how much of what was asked for it is, not by the number of calls.
+#[test]
+fn a_planner_that_emits_most_of_what_it_is_asked_for_may_be_asked_as_often_as_the_depth_takes() {
+    let sizes = Sizes {
+        segments: 4096,
+        ..Sizes::default()
+    };
+    let (mut rough, calls, _ends) = with_ring(sizes, |duration_s, sink| {
+        let mut segment = Segment::rest(&AxisVector::ZERO, 0.6 * duration_s);
+        segment.flags = SegmentFlags::default();
+        // A stop takes 8 s, which is more than a thousand of these pieces.
+        (segment.path[1], segment.stop_deceleration_mm_per_s2) = (40.0, 5.0);
+        sink.segment(&segment);
+        (0.6 * duration_s, false)
+    });
+    assert_eq!(rough.step(&mut ()).unwrap(), Progress::Working);
+    assert!(calls.load(Relaxed) > u64::from(MAX_SHORT_ADVANCES));
+}
+
+/// A queue that gets no deeper is started with as it is: where the plan is over, and where the planner has failed.
+#[test]
+fn what_is_queued_is_driven_though_it_is_short_where_nothing_follows() {
+    let (mut rough, _calls, (fine, _host)) = with(|_, sink| {
+        piece(0.001, SegmentFlags::ENDS_AT_REST, sink);
+        (0.001, true)
+    });
+    rough.step(&mut ()).unwrap();
+    assert!(fine.depth.may_start(0.0), "the program is over");
+    let (mut rough, _calls, (fine, _host)) = with(|_, sink| {
+        piece(0.001, SegmentFlags::default(), sink);
+        (0.001, true)
+    });
+    rough.step(&mut ()).expect_err("it is done in motion");
+    assert!(fine.depth.may_start(0.0), "the planner has failed");
+}
+
 /// It drives on as planned while the rough loop is late by no more than the rate that it tells holds for, and not much longer.
 #[test]
 fn a_rough_loop_that_is_late_leaves_what_the_worst_stop_asks_for() {
@@ -293,4 +329,36 @@ fn a_file_is_read_no_further_while_the_queue_is_deep() {
     assert!(first > 0);
     (0..10).for_each(|_| assert!(rough.step(&mut ()).is_ok()));
     assert_eq!(read.load(Relaxed), first, "nothing was driven since");
+}
+
+/// A sender has few places to wait in: a line that waits there keeps the next one from being sent.
+#[test]
+fn lines_of_a_sender_are_taken_as_they_come_though_the_queue_is_deep() {
+    struct Counts(Arc<AtomicU64>);
+
+    impl Plans for Counts {
+        fn accept(&mut self, _block: &Block) -> Accepted {
+            self.0.fetch_add(1, Relaxed);
+            Accepted::Accepted
+        }
+        fn advance(&mut self, duration_s: f64, sink: &mut dyn SegmentSink) -> (f64, bool) {
+            piece(duration_s, SegmentFlags::default(), sink);
+            (duration_s, false)
+        }
+    }
+
+    const LINES: u64 = 20;
+    let accepted = Arc::new(AtomicU64::new(0));
+    let planner = Box::new(Fake(Counts(Arc::clone(&accepted))));
+    let sender = Sender {
+        lines: LINES,
+        given: 0,
+        period: false,
+    };
+    let (rough, _fine, _host) = bridge(Sizes::default());
+    let config = RoughConfig::new(ROUGH_PERIOD_S, ROUGH_PERIOD_S);
+    let mut rough = RoughLoop::new(config, Box::new(sender), planner, rough);
+    (0..2 * LINES).for_each(|_| assert!(rough.step(&mut ()).is_ok()));
+    // Nothing is driven, so it is deep from the start.
+    assert_eq!(accepted.load(Relaxed), LINES);
 }
