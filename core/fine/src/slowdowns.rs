@@ -20,6 +20,11 @@ pub struct Slowdown {
     pub speed_mm_per_s: f64,
     /// Path acceleration planned from there on, mm/s².
     pub acceleration_mm_per_s2: f64,
+    /// Least path deceleration that the plan leaves on the way there from the place before, mm/s². What lies behind the place, a rotary
+    /// axis that turns on next to no path, says nothing of it.
+    pub stop_deceleration_mm_per_s2: f64,
+    /// Path coordinate of the last rest of the plan before it, mm; infinitely far behind where none was seen.
+    pub rest_mm: f64,
 }
 
 impl Slowdown {
@@ -49,6 +54,10 @@ pub struct Slowdowns {
     next: u64,
     /// Programmed feed up to there, mm/s.
     feed_mm_per_s: f64,
+    /// Least deceleration that the plan leaves since the last mark, mm/s².
+    stop_deceleration_mm_per_s2: f64,
+    /// Path coordinate of the last rest, mm.
+    rest_mm: f64,
     marks: Box<[Slowdown]>,
     first: usize,
     count: usize,
@@ -60,6 +69,8 @@ impl Slowdowns {
         Self {
             next: 0,
             feed_mm_per_s: 0.0,
+            stop_deceleration_mm_per_s2: f64::INFINITY,
+            rest_mm: f64::NEG_INFINITY,
             marks: vec![Slowdown::default(); MARKS].into_boxed_slice(),
             first: 0,
             count: 0,
@@ -75,6 +86,8 @@ impl Slowdowns {
             let before = cursor.segment().feed_mm_per_s;
             (self.next, self.feed_mm_per_s) =
                 (cursor.next_number(), if rests { 0.0 } else { before });
+            self.stop_deceleration_mm_per_s2 = f64::INFINITY;
+            self.rest_mm = f64::NEG_INFINITY;
         }
         while self.count > 0 && self.marks[self.first].path_mm <= here_mm {
             self.first = (self.first + 1) % MARKS;
@@ -94,11 +107,29 @@ impl Slowdowns {
     /// Forgets the marks: what is queued counts no more.
     pub fn clear(&mut self) {
         self.count = 0;
+        self.stop_deceleration_mm_per_s2 = f64::INFINITY;
+        self.rest_mm = f64::NEG_INFINITY;
     }
 
     /// The marks ahead, nearest first.
-    pub fn marks(&self) -> impl Iterator<Item = &Slowdown> {
+    fn marks(&self) -> impl Iterator<Item = &Slowdown> {
         (0..self.count).map(|n| &self.marks[(self.first + n) % MARKS])
+    }
+
+    /// The marks to be met from `here_mm` on, nearest first, each with the least deceleration that the plan leaves on the way there, mm/s²,
+    /// where the segment that is driven leaves `here_mm_per_s2`. A mark behind a rest of the plan is met from that rest.
+    pub fn to_meet(
+        &self,
+        here_mm: f64,
+        here_mm_per_s2: f64,
+    ) -> impl Iterator<Item = (&Slowdown, f64)> {
+        let mut least_mm_per_s2 = here_mm_per_s2;
+        self.marks()
+            .take_while(move |mark| mark.rest_mm <= here_mm)
+            .map(move |mark| {
+                least_mm_per_s2 = least_mm_per_s2.min(mark.stop_deceleration_mm_per_s2);
+                (mark, least_mm_per_s2)
+            })
     }
 
     fn see(&mut self, segment: &Segment) {
@@ -109,11 +140,20 @@ impl Slowdowns {
                 feed_mm_per_s: segment.feed_mm_per_s,
                 speed_mm_per_s: segment.path[1],
                 acceleration_mm_per_s2: 2.0 * segment.path[2],
+                stop_deceleration_mm_per_s2: self.stop_deceleration_mm_per_s2,
+                rest_mm: self.rest_mm,
             });
+            self.stop_deceleration_mm_per_s2 = f64::INFINITY;
+        }
+        if moves {
+            self.stop_deceleration_mm_per_s2 = self
+                .stop_deceleration_mm_per_s2
+                .min(segment.stop_deceleration_mm_per_s2);
         }
         if segment.flags.contains(SegmentFlags::ENDS_AT_REST) {
             // A feed behind a rest is met from nothing; and it may be one of rotary axes, in other units.
             self.feed_mm_per_s = 0.0;
+            self.rest_mm = segment.path_mm(segment.duration_s);
         } else if moves {
             self.feed_mm_per_s = segment.feed_mm_per_s;
         }
@@ -129,6 +169,9 @@ impl Slowdowns {
             last.speed_mm_per_s = last.speed_mm_per_s.min(mark.speed_mm_per_s);
             last.acceleration_mm_per_s2 =
                 last.acceleration_mm_per_s2.max(mark.acceleration_mm_per_s2);
+            last.stop_deceleration_mm_per_s2 = last
+                .stop_deceleration_mm_per_s2
+                .min(mark.stop_deceleration_mm_per_s2);
         }
     }
 }
@@ -254,6 +297,65 @@ mod tests {
         );
     }
 
+    /// Segments of 1 mm, each with its feed, what it leaves to brake with, and whether it ends at rest; the marks to be met from
+    /// `here_mm` on, and what is left on the way to each.
+    fn to_meet(segments: &[(f64, f64, bool)], here_mm: f64) -> Vec<(f64, f64)> {
+        let mut slowdowns = Slowdowns::new();
+        for (number, (feed_mm_per_s, leaves_mm_per_s2, rests)) in segments.iter().enumerate() {
+            let mut segment = Segment::rest(&AxisVector::ZERO, 1.0);
+            segment.flags = if *rests {
+                SegmentFlags::ENDS_AT_REST
+            } else {
+                SegmentFlags::default()
+            };
+            segment.feed_mm_per_s = *feed_mm_per_s;
+            segment.stop_deceleration_mm_per_s2 = *leaves_mm_per_s2;
+            segment.path[0] = number as f64;
+            segment.path[1] = 1.0;
+            slowdowns.see(&segment);
+        }
+        slowdowns
+            .to_meet(here_mm, 1000.0)
+            .map(|(mark, leaves_mm_per_s2)| (mark.path_mm, leaves_mm_per_s2))
+            .collect()
+    }
+
+    /// A rotary axis that turns on next to no path leaves next to nothing along it: behind a lower feed it must not have the machine crawl
+    /// towards that.
+    #[test]
+    fn what_is_left_behind_a_place_says_nothing_of_the_way_there() {
+        let slower_and_slower = [
+            (9.0, 500.0, false),
+            (9.0, 800.0, false),
+            (8.0, 900.0, false),
+            (7.0, 0.02, false),
+        ];
+        assert_eq!(
+            to_meet(&slower_and_slower, 0.0),
+            [(2.0, 500.0), (3.0, 500.0)]
+        );
+        let behind_what_leaves_little = [(9.0, 0.02, false), (8.0, 900.0, false)];
+        assert_eq!(to_meet(&behind_what_leaves_little, 0.0), [(1.0, 0.02)]);
+        let with_more_room = [(9.0, 4000.0, false), (8.0, 900.0, false)];
+        assert_eq!(to_meet(&with_more_room, 0.0), [(1.0, 1000.0)]);
+    }
+
+    #[test]
+    fn a_lower_feed_behind_a_rest_of_the_plan_is_met_from_that_rest() {
+        let rests_between = [
+            (9.0, 500.0, false),
+            (8.0, 800.0, true),
+            (9.0, 900.0, false),
+            (7.0, 900.0, false),
+        ];
+        assert_eq!(to_meet(&rests_between, 0.5), [(1.0, 500.0)]);
+        assert_eq!(
+            to_meet(&rests_between, 2.0),
+            [(1.0, 500.0), (3.0, 500.0)],
+            "from the rest on"
+        );
+    }
+
     #[test]
     fn a_plan_that_gets_faster_behind_its_place_is_met_slower_but_not_below_half() {
         let slowdown = |acceleration_mm_per_s2: f64| Slowdown {
@@ -261,6 +363,7 @@ mod tests {
             feed_mm_per_s: 10.0,
             speed_mm_per_s: 100.0,
             acceleration_mm_per_s2,
+            ..Slowdown::default()
         };
         // At a twentieth of the rate a period gains 0.0025 of a thousandth of the acceleration.
         for (acceleration, expected) in [(-1e6, 5.0), (0.0, 5.0), (4e5, 4.0), (4e6, 2.5)] {
@@ -279,6 +382,8 @@ mod tests {
                 feed_mm_per_s: 1000.0 - number as f64,
                 speed_mm_per_s: 50.0,
                 acceleration_mm_per_s2: if high { 700.0 } else { 5.0 },
+                stop_deceleration_mm_per_s2: if high { 3.0 } else { 9.0 },
+                rest_mm: f64::NEG_INFINITY,
             });
         }
         let last = slowdowns.marks().last().unwrap();
@@ -287,6 +392,7 @@ mod tests {
             (last.feed_mm_per_s, last.acceleration_mm_per_s2),
             (1000.0 - (MARKS + 2) as f64, 700.0)
         );
+        assert_eq!(last.stop_deceleration_mm_per_s2, 3.0);
     }
 
     #[test]

@@ -17,7 +17,7 @@ use crate::horizon::Horizon;
 use crate::law::Along;
 use crate::period_points::PeriodPoints;
 use crate::plan_ahead::Axes;
-use crate::slowdowns::{LineEnd, Slowdown, Slowdowns};
+use crate::slowdowns::{LineEnd, Slowdowns};
 
 /// Why the rate of program time is to go down.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -615,28 +615,37 @@ impl PlanFollower {
             + SLOWDOWN_PERIODS * self.period_s;
         let until_s = self.cursor.program_time_s() + stop_s;
         self.slowdowns.extend(&mut self.cursor, until_s);
-        let marks = self.slowdowns.marks();
-        let met = |mark: &Slowdown| mark.speed_to_meet_mm_per_s(ratios.feed, self.period_s);
-        let mut least = (at_end, f64::INFINITY);
-        for mark in marks {
-            least = (
-                least.0.min(self.speed_towards(mark.path_mm, met(mark))),
-                least.1.min(met(mark)),
-            );
+        let segment = self.cursor.segment();
+        let here_mm_per_s2 = segment.stop_deceleration_mm_per_s2;
+        let to_meet = self
+            .slowdowns
+            .to_meet(self.cursor.path_mm(), here_mm_per_s2);
+        let mut speed_mm_per_s = at_end;
+        let mut least_met_mm_per_s = f64::INFINITY;
+        for (mark, leaves_mm_per_s2) in to_meet {
+            let met_mm_per_s = mark.speed_to_meet_mm_per_s(ratios.feed, self.period_s);
+            let braking = Along {
+                max_mm_per_s2: STOP_SHARE * leaves_mm_per_s2,
+                ..along
+            };
+            speed_mm_per_s =
+                speed_mm_per_s.min(self.speed_towards(&braking, mark.path_mm, met_mm_per_s));
+            least_met_mm_per_s = least_met_mm_per_s.min(met_mm_per_s);
         }
         let planned_mm_per_s = self.cursor.path_speed_mm_per_s();
-        if least.1 < planned_mm_per_s {
-            self.ask_for_rate(least.1 / planned_mm_per_s);
+        if least_met_mm_per_s < planned_mm_per_s {
+            self.ask_for_rate(least_met_mm_per_s / planned_mm_per_s);
         }
-        least.0
+        speed_mm_per_s
     }
 
-    /// The speed at the end of this period from which `end_mm_per_s` can be met at `place_mm`, mm/s.
+    /// The speed at the end of this period from which `end_mm_per_s` can be met at `place_mm` where the state along the path is `along`,
+    /// mm/s.
     ///
     /// With limits of order 2 the speeds at the ends of the periods to come are laid out ([`Along::speed_towards`]). With a
     /// jerk limit it is decided period by period whether braking may still wait.
-    pub(super) fn speed_towards(&self, place_mm: f64, end_mm_per_s: f64) -> f64 {
-        let (along, period_s) = (self.along(), self.period_s);
+    pub(super) fn speed_towards(&self, along: &Along, place_mm: f64, end_mm_per_s: f64) -> f64 {
+        let period_s = self.period_s;
         let left_mm = place_mm - self.cursor.path_mm();
         if self.order < 3 {
             return along.speed_towards(left_mm, end_mm_per_s, period_s);
@@ -647,7 +656,7 @@ impl PlanFollower {
             + SETTLING_PERIODS * period_s * end_mm_per_s;
         let later = Along {
             speed_mm_per_s: along.speed_mm_per_s.max(end_mm_per_s),
-            ..along
+            ..*along
         };
         let waits = later.way_to_mm(end_mm_per_s) + soon_mm < left_mm;
         if waits { f64::INFINITY } else { end_mm_per_s }
@@ -687,7 +696,7 @@ impl PlanFollower {
     /// for it instead, until the end is next to reached.
     fn speed_to_rest(&self, end_mm: f64) -> f64 {
         if self.order < 3 {
-            return self.speed_towards(end_mm, 0.0);
+            return self.speed_towards(&self.along(), end_mm, 0.0);
         }
         if end_mm - self.cursor.path_mm() > AT_LINE_END_MM {
             f64::INFINITY

@@ -207,8 +207,14 @@ fn braking_for_a_place_ahead_waits_until_it_has_to_begin() {
         let soon_mm = PERIOD_S * (BRAKING_PERIODS * 20.0 + SETTLING_PERIODS * end);
         let begins_mm = follower.cursor.path_mm() + way_mm + soon_mm;
         assert!(way_mm > 1e-3, "{way_mm}");
-        assert_eq!(follower.speed_towards(begins_mm + 1e-6, end), f64::INFINITY);
-        assert_eq!(follower.speed_towards(begins_mm - 1e-6, end), end);
+        assert_eq!(
+            follower.speed_towards(&follower.along(), begins_mm + 1e-6, end),
+            f64::INFINITY
+        );
+        assert_eq!(
+            follower.speed_towards(&follower.along(), begins_mm - 1e-6, end),
+            end
+        );
     }
 }
 
