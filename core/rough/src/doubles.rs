@@ -122,6 +122,37 @@ impl Source for Script {
     }
 }
 
+/// A source that differs from what a source does by default in every method.
+#[derive(Default)]
+pub struct Waits {
+    periods: u32,
+    input: f64,
+}
+
+impl Source for Waits {
+    fn next_items(&mut self, _items: &mut Vec<Item>) -> Result<bool, String> {
+        Ok(true)
+    }
+    fn may_go_on(&mut self, driven: bool) -> bool {
+        driven
+    }
+    fn streams(&self) -> bool {
+        true
+    }
+    fn period(&mut self) {
+        self.periods += 1;
+    }
+    fn is_waiting(&self) -> bool {
+        self.periods > 0
+    }
+    fn provide_input(&mut self, value: f64) {
+        self.input = value;
+    }
+    fn provide_rest(&mut self, _rest: &Rest) -> bool {
+        self.input > 0.0
+    }
+}
+
 /// A block of a line of its own.
 pub fn block_of(index: u64) -> Block {
     Block {

@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex};
 
 use super::*;
-use crate::doubles::{Answer, Script, block, probe, rest};
+use crate::doubles::{Answer, Script, Waits, block, probe, rest};
 use tandem_gcode::{Input, InputMode, InputWait};
 use tandem_sdk::{Curve, Event, EventKind};
 
@@ -252,4 +252,12 @@ fn what_an_input_has_answered_reaches_the_program_behind_a_policy() {
     source.next_items(&mut vec![]).unwrap();
     source.provide_input(-1.0);
     assert_eq!(*told.lock().unwrap(), [Answer::Input(-1.0)]);
+}
+
+#[test]
+fn a_source_behind_a_policy_counts_the_periods_for_which_it_waits() {
+    let mut source = Tuned::new(Waits::default(), Recorder::default());
+    assert!(!source.is_waiting());
+    source.period();
+    assert!(source.is_waiting());
 }

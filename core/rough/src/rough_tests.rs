@@ -131,6 +131,21 @@ fn a_planner_that_emits_most_of_what_it_is_asked_for_may_be_asked_as_often_as_th
     assert!(calls.load(Relaxed) > u64::from(MAX_SHORT_ADVANCES));
 }
 
+/// Emits a little, and then says that it is done though it is in motion.
+struct Fails {
+    emitted: bool,
+}
+
+impl Plans for Fails {
+    fn advance(&mut self, _duration_s: f64, sink: &mut dyn SegmentSink) -> (f64, bool) {
+        if std::mem::replace(&mut self.emitted, true) {
+            return (0.0, true);
+        }
+        piece(0.001, SegmentFlags::default(), sink);
+        (0.001, false)
+    }
+}
+
 /// A queue that gets no deeper is started with as it is: where the plan is over, and where the planner has failed.
 #[test]
 fn what_is_queued_is_driven_though_it_is_short_where_nothing_follows() {
@@ -140,10 +155,15 @@ fn what_is_queued_is_driven_though_it_is_short_where_nothing_follows() {
     });
     rough.step(&mut ()).unwrap();
     assert!(fine.depth.may_start(0.0), "the program is over");
-    let (mut rough, _calls, (fine, _host)) = with(|_, sink| {
-        piece(0.001, SegmentFlags::default(), sink);
-        (0.001, true)
-    });
+    let (rough, fine, _host) = bridge(Sizes::default());
+    let config = RoughConfig::new(ROUGH_PERIOD_S, ROUGH_PERIOD_S);
+    let over = Box::new(Script::of(vec![Ok(vec![Item::End])]));
+    let mut rough = RoughLoop::new(
+        config,
+        over,
+        Box::new(Fake(Fails { emitted: false })),
+        rough,
+    );
     rough.step(&mut ()).expect_err("it is done in motion");
     assert!(fine.depth.may_start(0.0), "the planner has failed");
 }
@@ -341,9 +361,10 @@ fn lines_of_a_sender_are_taken_as_they_come_though_the_queue_is_deep() {
             self.0.fetch_add(1, Relaxed);
             Accepted::Accepted
         }
+        /// More than it is asked for, by which the queue gets deeper than it has to be.
         fn advance(&mut self, duration_s: f64, sink: &mut dyn SegmentSink) -> (f64, bool) {
-            piece(duration_s, SegmentFlags::default(), sink);
-            (duration_s, false)
+            piece(20.0 * duration_s, SegmentFlags::default(), sink);
+            (20.0 * duration_s, false)
         }
     }
 
@@ -359,6 +380,7 @@ fn lines_of_a_sender_are_taken_as_they_come_though_the_queue_is_deep() {
     let config = RoughConfig::new(ROUGH_PERIOD_S, ROUGH_PERIOD_S);
     let mut rough = RoughLoop::new(config, Box::new(sender), planner, rough);
     (0..2 * LINES).for_each(|_| assert!(rough.step(&mut ()).is_ok()));
-    // Nothing is driven, so it is deep from the start.
+    // Nothing is driven, so it stays deep.
+    assert!(rough.queue.is_deep(MARGIN_PERIODS * ROUGH_PERIOD_S));
     assert_eq!(accepted.load(Relaxed), LINES);
 }

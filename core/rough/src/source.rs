@@ -101,7 +101,7 @@ impl Source for Stream {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::doubles::rest;
+    use crate::doubles::{Waits, rest};
     use tandem_gcode::{Config, ProbeInput, Program, check};
     use tandem_sdk::Axes;
 
@@ -149,37 +149,6 @@ mod tests {
         assert_eq!(next_block(&mut stream).end[0], 10.0);
         assert!(stream.provide_rest(&rest(RestCause::Edge)));
         assert_eq!(next_block(&mut stream).start[0], 1.5);
-    }
-
-    /// A source that differs from what a source does by default in every method.
-    #[derive(Default)]
-    struct Waits {
-        periods: u32,
-        input: f64,
-    }
-
-    impl Source for Waits {
-        fn next_items(&mut self, _items: &mut Vec<Item>) -> Result<bool, String> {
-            Ok(true)
-        }
-        fn may_go_on(&mut self, driven: bool) -> bool {
-            driven
-        }
-        fn streams(&self) -> bool {
-            true
-        }
-        fn period(&mut self) {
-            self.periods += 1;
-        }
-        fn is_waiting(&self) -> bool {
-            self.periods > 0
-        }
-        fn provide_input(&mut self, value: f64) {
-            self.input = value;
-        }
-        fn provide_rest(&mut self, _rest: &Rest) -> bool {
-            self.input > 0.0
-        }
     }
 
     #[test]
