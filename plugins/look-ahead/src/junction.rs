@@ -124,7 +124,10 @@ impl Rule {
                 k: bend[axis],
                 a: MARGIN * limits.acceleration_mm_per_s2,
             };
-            let row = costs.row(straight, entry.half_step[axis], end.half_step[axis]);
+            let (row, cap) = costs.row(straight, entry.half_step[axis], end.half_step[axis]);
+            if let Some(square) = cap {
+                turning.and(square);
+            }
             if row.limits() {
                 entry.rows.push(row);
                 turning.and(row.turning_cap());
@@ -171,18 +174,21 @@ impl Costs {
         }
     }
 
-    /// The row of one axis with the cost of the half steps `before` and `after`: in the form that allows more speed.
-    ///
+    /// The row of one axis with the cost of the half steps `before` and `after`, in the form that allows more speed, and the square of the
+    /// speed up to which it holds, as a ratio; without one it holds up to the feed.
     /// The rate that takes the steps back is at most `v_peak·(v_s|Δu_s| + v_e|Δu_e|)/(2L)`. Where the junctions are
     /// slow and the block long, that is a small constant. In a chain of chords, where the junction feeds are the feed
     /// itself, it goes with the square of the speed: `w·|Δu_s + Δu_e|/(2L)`, and what is left where the end speeds
-    /// differ goes with the path acceleration.
-    fn row(&self, row: Row, before: f64, after: f64) -> Row {
+    /// differ goes with the path acceleration. Where the feed is too high for the first form and the second leaves next to no path
+    /// acceleration (a rotary axis stops, and a linear one whose way is counted in mm goes on), the block is driven at the speed up to
+    /// which the constant is small.
+    fn row(&self, row: Row, before: f64, after: f64) -> (Row, Option<(f64, f64)>) {
         if before == 0.0 && after == 0.0 {
-            return row;
+            return (row, None);
         }
         let [start, end] = self.ends_mm_per_s;
-        let taken = self.feed_mm_per_s * (start * before.abs() + end * after.abs()) * self.per_mm;
+        let per_speed = (start * before.abs() + end * after.abs()) * self.per_mm;
+        let taken = self.feed_mm_per_s * per_speed;
         let constant = Row {
             a: row.a - taken,
             ..row
@@ -193,24 +199,40 @@ impl Costs {
             a: row.a,
         };
         let affordable = constant.a >= (1.0 - CONSTANT_SHARE) * row.a;
-        if affordable && self.reaches_as_far(&constant, &square) {
-            constant
-        } else {
-            square
+        if affordable {
+            if self.reaches_as_far(&constant, &square) {
+                return (constant, None);
+            }
+            return (square, None);
         }
+        let afforded = CONSTANT_SHARE * row.a;
+        let slowed = Row {
+            a: row.a - afforded,
+            ..row
+        };
+        let cap = (afforded * afforded, per_speed * per_speed);
+        let of_square = self.reach(&square);
+        let cap_is_higher = cap.0 * of_square.1 > of_square.0 * cap.1;
+        if cap_is_higher && self.reaches_as_far(&slowed, &square) {
+            (slowed, Some(cap))
+        } else {
+            (square, None)
+        }
+    }
+
+    /// Square of the speed that a row lets the block come to from its slower junction, as a ratio.
+    fn reach(&self, row: &Row) -> (f64, f64) {
+        let slow = lesser(self.ends_mm_per_s[0], self.ends_mm_per_s[1]).powi(2);
+        (
+            row.h * slow + 2.0 * self.length_mm * row.a,
+            row.h + 2.0 * self.length_mm * row.k,
+        )
     }
 
     /// Whether from the slower junction `one` reaches the feed, or at least as much speed as `other`.
     fn reaches_as_far(&self, one: &Row, other: &Row) -> bool {
-        let slow = lesser(self.ends_mm_per_s[0], self.ends_mm_per_s[1]).powi(2);
-        let reach = |r: &Row| {
-            (
-                r.h * slow + 2.0 * self.length_mm * r.a,
-                r.h + 2.0 * self.length_mm * r.k,
-            )
-        };
-        let one = reach(one);
-        let other = reach(other);
+        let one = self.reach(one);
+        let other = self.reach(other);
         one.0 >= self.feed_mm_per_s.powi(2) * one.1 || one.0 * other.1 >= other.0 * one.1
     }
 }

@@ -145,6 +145,34 @@ fn a_circle_of_fine_chords_is_driven_at_its_centripetal_speed() {
     assert!(mean > 0.9 * slow, "{mean} against {slow}");
 }
 
+/// The way of a line that moves a linear axis is in mm and that of a turn alone in rad: where one follows the other, the turn's direction
+/// steps by nearly 1, which a feed in mm/s makes dear.
+#[test]
+fn a_line_between_slow_turns_is_not_driven_as_slowly_as_they_are() {
+    let context = context(&[50.0, 50.0, 50.0, 0.0024], 0.08, PERIOD_S);
+    let points = [
+        [0.0, 0.0, 0.0, 0.0],
+        [0.0, 0.0, 0.0, 0.0035],
+        [0.4, 0.0, 0.0, 0.00357],
+        [0.4, 0.0, 0.0, 0.0059],
+    ]
+    .map(|p| AxisVector::from_slice(&p));
+    let collected = run(
+        &context,
+        &Options::default(),
+        &lines(&points, |_| 252.0),
+        0.008,
+    );
+    assert!(worst_excess(&collected, &context) < 1e-6);
+    // By itself the line takes a little more than its 0.4 mm at half of a speed that the turns' acceleration leaves it, 0.6 mm/s.
+    let line_s = collected.reports[1].time_s;
+    assert!(line_s < 2.0, "{line_s}");
+    assert!(
+        collected.junction_feeds()[1] > 0.0,
+        "the line is entered in motion"
+    );
+}
+
 #[test]
 fn a_reversal_and_a_right_angle_step_by_the_allowed_difference() {
     let context = context(&[1000.0, 1000.0], 100.0, PERIOD_S);
