@@ -13,8 +13,11 @@ use crate::route::{Item, Leg};
 const STOP_JERK: f64 = 0.5;
 /// Least duration of a segment, s: the derivatives of a shorter one are rounding.
 const MIN_S: f64 = 5e-5;
-/// Fine periods by which the marks may be off where the motion passes the end of a leg: where they are more off it is not near that end.
-const MAX_OFF_PERIODS: f64 = 4.0;
+/// Fine periods by which the marks may be off where the motion passes the end of a leg. Where feeds are nearly the same it may be as
+/// early or late as half a box is long; a motion that takes longer for that has hardly any speed there.
+const MAX_OFF_PERIODS: usize = 256;
+/// Halvings of the period in which the motion passes that end.
+const HALVINGS: usize = 30;
 
 /// The path coordinate of what was emitted.
 #[derive(Debug, Default)]
@@ -131,21 +134,41 @@ impl<const L: usize> PathAhead<L> {
     }
 
     /// When the motion is over the leg in front, which ends at the path coordinate `end`. Between two marks that is an even pace, and the
-    /// motion may be a period off; where the feed is lower behind it, it is when the motion passes the end of the leg.
+    /// motion may be periods off; where the feed is another one behind it, it is when the motion passes the end of the leg. What the
+    /// feed of a segment bounds is then on the block that has it.
     fn over_s(&self, end: f64) -> f64 {
         let about_s = self.window.time_of(end);
-        let Some(chord) = self.route.last_before_lower_feed() else {
+        let Some((vertex, direction)) = self.route.end_before_other_feed() else {
             return about_s;
         };
-        let [position, velocity, _] = self.window.state(about_s);
-        let left = dot(&minus(&chord.at(end), &position), &chord.direction);
-        let speed = dot(&velocity, &chord.direction);
-        let most_s = MAX_OFF_PERIODS * self.frame.period_s;
-        if left.abs() < most_s * speed {
-            about_s + left / speed
+        let is_before = |t: f64| {
+            let [position, ..] = self.window.state(t);
+            dot(&minus(&vertex, &position), &direction) > 0.0
+        };
+        let starts_before = is_before(about_s);
+        let step_s = if starts_before {
+            self.frame.period_s
         } else {
-            about_s
+            -self.frame.period_s
+        };
+        let mut near_s = about_s;
+        for _ in 0..MAX_OFF_PERIODS {
+            let mut far_s = near_s + step_s;
+            if is_before(far_s) == starts_before {
+                near_s = far_s;
+                continue;
+            }
+            for _ in 0..HALVINGS {
+                let middle_s = f64::midpoint(near_s, far_s);
+                if is_before(middle_s) == starts_before {
+                    near_s = middle_s;
+                } else {
+                    far_s = middle_s;
+                }
+            }
+            return near_s;
         }
+        about_s
     }
 
     /// Gives the report of the leg in front, where that was not done.

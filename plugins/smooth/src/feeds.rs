@@ -1,11 +1,12 @@
 //! The feeds along a window: what an interval may have before it is planned, and what a piece of motion has of it.
 
-use tandem_motion::tube::{Lanes, Waypoint};
+use tandem_motion::tube::{Lanes, Waypoint, each};
 
 use crate::frame::{dot, minus};
+use crate::plan::Start;
 use crate::route::Run;
 use crate::verify::larger;
-use crate::window::{Piece, Window};
+use crate::window::Window;
 
 /// The pace of intervals, asked for in order: the lowest of the chords whose waypoints lie in or next to one. A vertex has both
 /// of its chords: speed at the end of an interval is what the next one allows.
@@ -51,67 +52,176 @@ impl<const L: usize> Feeds<'_, L> {
     }
 }
 
-/// The feeds of the chords that a piece touches.
+/// Parts of a piece at whose ends its speed is looked at first.
+const PARTS: usize = 8;
+/// Halvings of a part at most: a motion that brakes into a lower feed is then known to a few nanoseconds.
+const HALVINGS: u32 = 16;
+
+/// The speed of a motion beside the feeds of the chords that it is on.
+///
+/// What a sample shows of the speed is its way from the sample before, over the period, and it may have the highest feed of the
+/// chords which that way touches. Of samples of every phase this is a function of the time in the middle of the way, and its bound is
+/// exact: between two looks that are `h` apart the way is off a line from one to the other by no more than jerk adds, which is
+/// J·h²/8 of the speed, and touches at least what lies between where the later look begins and where the earlier one ends. Where that
+/// does not decide it, the time between them is halved.
 pub struct Feeder<'a, const L: usize> {
-    pub run: &'a Run<'a, L>,
-    pub timer_at: usize,
-    pub chord: usize,
+    run: &'a Run<'a, L>,
+    counted: &'a Lanes<L>,
+    period_s: f64,
+    /// The window that goes on in the one that is judged, and when.
+    old: Option<(&'a Window<L>, f64)>,
+    /// The feed of all chords that the window comes near, where it is one.
+    even: Option<f64>,
+    /// Where chords were looked up last.
+    chord: usize,
 }
 
-impl<const L: usize> Feeder<'_, L> {
-    /// The lowest and the highest.
-    pub fn range(&mut self, window: &Window<L>, n: usize) -> (f64, f64) {
-        let piece = &window.pieces[n];
-        let marks = &window.marks;
-        while self.timer_at + 2 < marks.len() && marks[self.timer_at + 1].t <= piece.start_s {
-            self.timer_at += 1;
-        }
-        self.chord = self.run.chord_at(marks[self.timer_at].s, self.chord);
-        let mut range = (
-            self.run.chords[self.chord].feed,
-            self.run.chords[self.chord].feed,
-        );
-        let mut mark = self.timer_at;
-        while mark + 1 < marks.len() && marks[mark].t < piece.end_s() {
-            mark += 1;
-        }
-        let mut i = self.chord;
-        while i + 1 < self.run.chords.len() && self.run.chords[i + 1].s < marks[mark].s {
-            i += 1;
-            let feed = self.run.chords[i].feed;
-            range = (range.0.min(feed), range.1.max(feed));
-        }
-        range
+/// The way of a sample of which `t` is in the middle.
+#[derive(Clone, Copy)]
+struct Look {
+    t: f64,
+    speed: f64,
+    /// The chords on which it begins and ends.
+    chords: [usize; 2],
+}
+
+impl<'a, const L: usize> Feeder<'a, L> {
+    pub fn new(
+        run: &'a Run<'a, L>,
+        counted: &'a Lanes<L>,
+        period_s: f64,
+        start: &Start<'a, L>,
+        window: &Window<L>,
+    ) -> Self {
+        let mut feeder = Self {
+            run,
+            counted,
+            period_s,
+            old: start.old,
+            even: None,
+            chord: run.chord_at(start.s, 0),
+        };
+        let first = feeder.chord_at(window, -period_s / 2.0);
+        let last = feeder.chord_at(window, window.duration_s());
+        let (least, most) = feeder.feeds(first, last);
+        feeder.even = (least >= most).then_some(most);
+        feeder.chord = first;
+        feeder
     }
 
-    /// The highest path speed of a piece as a share of the feed where it is: that of the chord beside it, or of one that is
-    /// reached within half a fine period.
-    pub fn peak(&self, piece: &Piece<L>, counted: &Lanes<L>, period_s: f64, jerk: f64) -> f64 {
-        let chords = self.run.chords;
-        // What jerk can add to a speed between two looks.
-        let between = jerk * (piece.duration_s / 16.0).powi(2) / 8.0;
-        let mut most = 0.0;
-        let mut i = self.chord;
-        for n in 0..=16 {
-            let t = f64::from(n) / 16.0 * piece.duration_s;
-            let at = piece.position(t);
-            let v = piece.velocity(t);
-            let passed = |i: usize| dot(&minus(&at, &chords[i].start), &chords[i].direction);
-            while i + 1 < chords.len() && passed(i + 1) > 0.0 {
-                i += 1;
-            }
-            let soon = dot(&v, &v).sqrt() * period_s / 2.0;
-            let mut feed = chords[i].feed;
-            if i > 0 && passed(i) < soon {
-                feed = feed.max(chords[i - 1].feed);
-            }
-            if i + 1 < chords.len() && passed(i) > chords[i].length - soon {
-                feed = feed.max(chords[i + 1].feed);
-            }
-            let squared: f64 = (0..L).map(|l| (counted[l] * v[l]).powi(2)).sum();
-            most = larger(most, (squared.sqrt() + between) / feed);
+    /// The lowest and the highest feed of the chords which the ways of samples touch that have their middle in piece `n`.
+    pub fn range(&mut self, window: &Window<L>, n: usize) -> (f64, f64) {
+        if let Some(feed) = self.even {
+            return (feed, feed);
         }
-        most
+        let piece = &window.pieces[n];
+        let [from, to] = self.touched(window, [piece.start_s, piece.end_s()]);
+        self.chord = from;
+        self.feeds(from, to)
+    }
+
+    /// The highest share of its feed that a sample has whose way has its middle in piece `n`, where no jerk is larger than `jerk`:
+    /// a bound of it where that is at most 1.
+    pub fn peak(&self, window: &Window<L>, n: usize, jerk: f64) -> f64 {
+        let piece = &window.pieces[n];
+        let part_s = piece.duration_s / PARTS as f64;
+        let looks: [Look; PARTS + 1] =
+            std::array::from_fn(|part| self.look(window, piece.start_s + part as f64 * part_s));
+        let most = looks
+            .iter()
+            .fold(0.0, |most, look| larger(most, self.share(look)));
+        if most > 1.0 || most.is_nan() {
+            return most;
+        }
+        looks.windows(2).fold(0.0, |most, pair| {
+            larger(
+                most,
+                self.between(window, [&pair[0], &pair[1]], jerk, HALVINGS),
+            )
+        })
+    }
+
+    fn between(&self, window: &Window<L>, [a, b]: [&Look; 2], jerk: f64, left: u32) -> f64 {
+        let apart_s = b.t - a.t;
+        let speed = larger(a.speed, b.speed) + jerk * apart_s * apart_s / 8.0;
+        let (first, last) = (b.chords[0], a.chords[1]);
+        let (least, most) = self.feeds(first, last);
+        // Where they are more than a period apart, a way between them may touch any one of the chords between.
+        let share = speed / if first <= last { most } else { least };
+        if share <= 1.0 || left == 0 || share.is_nan() {
+            return share;
+        }
+        let middle = self.look(window, f64::midpoint(a.t, b.t));
+        let here = self.share(&middle);
+        if here > 1.0 {
+            return here;
+        }
+        larger(
+            self.between(window, [a, &middle], jerk, left - 1),
+            self.between(window, [&middle, b], jerk, left - 1),
+        )
+    }
+
+    fn look(&self, window: &Window<L>, t: f64) -> Look {
+        let ends = [t - self.period_s / 2.0, t + self.period_s / 2.0];
+        let [from, to] = ends.map(|t| self.position(window, t));
+        let way: Lanes<L> = each(|l| self.counted[l] * (to[l] - from[l]));
+        Look {
+            t,
+            speed: dot(&way, &way).sqrt() / self.period_s,
+            chords: self.touched(window, [t, t]),
+        }
+    }
+
+    /// The share that a sample has of the highest feed of its way.
+    fn share(&self, look: &Look) -> f64 {
+        look.speed / self.feeds(look.chords[0], look.chords[1]).1
+    }
+
+    /// The lowest and the highest feed between two chords.
+    fn feeds(&self, a: usize, b: usize) -> (f64, f64) {
+        let chords = &self.run.chords[a.min(b)..=a.max(b)];
+        let none = (f64::INFINITY, 0.0);
+        chords.iter().fold(none, |(least, most), chord| {
+            (chord.feed.min(least), chord.feed.max(most))
+        })
+    }
+
+    /// The chords on which the ways of samples begin and end whose middles are between two times.
+    fn touched(&self, window: &Window<L>, [from_s, to_s]: [f64; 2]) -> [usize; 2] {
+        [
+            self.chord_at(window, from_s - self.period_s / 2.0),
+            self.chord_at(window, to_s + self.period_s / 2.0),
+        ]
+    }
+
+    fn position(&self, window: &Window<L>, t: f64) -> Lanes<L> {
+        let (window, t) = match self.old {
+            Some((old, now_s)) if t < 0.0 => (old, now_s + t),
+            _ => (window, t),
+        };
+        let piece = &window.pieces[window.piece_at(t)];
+        piece.position((t - piece.start_s).clamp(0.0, piece.duration_s))
+    }
+
+    /// The chord that the motion is on: the marks know it to a few periods, and from there on it goes by the planes that halve the
+    /// angles at vertices, on either side of which one of the two chords is the nearer one.
+    fn chord_at(&self, window: &Window<L>, t: f64) -> usize {
+        let chords = self.run.chords;
+        let at = self.position(window, t);
+        let is_passed = |vertex: usize| {
+            let [before, behind] = [&chords[vertex - 1], &chords[vertex]];
+            let way = minus(&at, &behind.start);
+            dot(&way, &before.direction) + dot(&way, &behind.direction) > 0.0
+        };
+        let mut i = self.run.chord_at(window.along(t), self.chord);
+        while i + 1 < chords.len() && is_passed(i + 1) {
+            i += 1;
+        }
+        while i > 0 && !is_passed(i) {
+            i -= 1;
+        }
+        i
     }
 }
 
@@ -119,7 +229,9 @@ impl<const L: usize> Feeder<'_, L> {
 mod tests {
     use super::*;
     use crate::order::tests::{lines, open};
+    use crate::route::Chord;
     use crate::timing::Mark;
+    use crate::window::Piece;
 
     /// Chords of 1 mm each with these feeds, and waypoints at these places in these intervals.
     fn asked(feeds: &[f64], waypoints: &[(f64, u32)], intervals: usize) -> Vec<f64> {
@@ -173,30 +285,108 @@ mod tests {
         assert_eq!(asked(&feeds, &[], 2), [20.0, 20.0]);
     }
 
-    /// A piece that ends where a chord begins does not touch that one.
-    #[test]
-    fn a_piece_has_the_feeds_of_the_chords_that_it_touches() {
-        let mut chords = lines(&[[0.0, 0.0], [5.0, 0.0], [7.0, 0.0], [10.0, 0.0]]);
-        for (chord, feed) in chords.iter_mut().zip([50.0, 20.0, 70.0]) {
-            chord.feed = feed;
+    fn rest_at_start() -> Start<'static, 2> {
+        Start {
+            state: [[0.0; 2]; 3],
+            s: 0.0,
+            resting: true,
+            before: &[],
+            end: 10.0,
+            window_s: 1.0,
+            old: None,
         }
-        let run = open(&chords);
+    }
+
+    /// Pieces of 1 s from one of these places on X to the next, each at its mean speed.
+    fn level(places: &[f64]) -> Window<2> {
         let mut window = Window::<2>::new();
-        let mut marks = vec![Mark { t: 0.0, s: 0.0 }];
-        for (t, s) in [(1.0, 5.0), (2.0, 6.0), (3.0, 10.0)] {
-            let rest = [[0.0; 2]; 3];
-            window
-                .pieces
-                .push(Piece::between(&rest, &rest, t - 1.0, 1.0));
-            marks.push(Mark { t, s });
+        for (n, ends) in places.windows(2).enumerate() {
+            let state = |x: f64| [[x, 0.0], [ends[1] - ends[0], 0.0], [0.0; 2]];
+            let piece = Piece::between(&state(ends[0]), &state(ends[1]), n as f64, 1.0);
+            window.pieces.push(piece);
         }
-        window.marks = marks;
-        let mut feeder = Feeder {
-            run: &run,
-            timer_at: 0,
-            chord: 0,
+        window.marks = places
+            .iter()
+            .enumerate()
+            .map(|(n, s)| Mark { t: n as f64, s: *s })
+            .collect();
+        window
+    }
+
+    /// Lines on X from one of these places to the next with feeds of their own.
+    fn fed(places: &[f64], feeds: &[f64]) -> Vec<Chord<2>> {
+        let points: Vec<_> = places.iter().map(|x| [*x, 0.0]).collect();
+        let mut chords = lines(&points);
+        for (chord, feed) in chords.iter_mut().zip(feeds) {
+            chord.feed = *feed;
+        }
+        chords
+    }
+
+    /// Where the motion is counts, and not where the marks say that it is.
+    #[test]
+    fn a_piece_has_the_feeds_of_the_chords_that_its_samples_touch() {
+        let chords = fed(&[0.0, 5.0, 7.0, 10.0], &[50.0, 20.0, 70.0]);
+        let run = open(&chords);
+        for late in [0.0, 0.9, -0.9] {
+            let mut window = level(&[0.0, 4.9, 6.0, 10.0]);
+            for mark in &mut window.marks[1..3] {
+                mark.s += late;
+            }
+            let mut feeder = Feeder::new(&run, &[1.0; 2], 1e-3, &rest_at_start(), &window);
+            let ranges = [0, 1, 2].map(|n| feeder.range(&window, n));
+            assert_eq!(ranges, [(50.0, 50.0), (20.0, 50.0), (20.0, 70.0)], "{late}");
+            // A period of samples that is so long touches the chords beside a piece too.
+            let mut feeder = Feeder::new(&run, &[1.0; 2], 0.5, &rest_at_start(), &window);
+            assert_eq!(feeder.range(&window, 0), (20.0, 50.0), "{late}");
+        }
+    }
+
+    /// A motion brakes evenly over the place where the feed falls from 10 to 5 mm/s, and with 4 mm/s² comes to 5 mm/s there, `late_s`
+    /// behind it or as long before it.
+    fn share_of_feed(late_s: f64) -> f64 {
+        const BRAKING: f64 = 4.0;
+        let at = 5.0;
+        let chords = fed(&[0.0, at, 20.0], &[10.0, 5.0]);
+        let run = open(&chords);
+        let state = |t: f64| {
+            let slower = t - 1.0 - late_s;
+            // Where the lower feed begins after 1 s.
+            let way = |t: f64| (5.0 + BRAKING * late_s) * t - BRAKING * t * t / 2.0;
+            [
+                [at + way(t - 1.0), 0.0],
+                [5.0 - BRAKING * slower, 0.0],
+                [-BRAKING, 0.0],
+            ]
         };
-        let ranges = [0, 1, 2].map(|n| feeder.range(&window, n));
-        assert_eq!(ranges, [(50.0, 50.0), (20.0, 20.0), (20.0, 70.0)]);
+        let mut window = Window::<2>::new();
+        window
+            .pieces
+            .push(Piece::between(&state(0.0), &state(1.6), 0.0, 1.6));
+        window.marks = vec![
+            Mark { t: 0.0, s: 0.2 },
+            Mark {
+                t: 1.6,
+                s: state(1.6)[0][0],
+            },
+        ];
+        let feeder = Feeder::new(&run, &[1.0; 2], PERIOD_S, &rest_at_start(), &window);
+        feeder.peak(&window, 0, 1e-3)
+    }
+
+    const PERIOD_S: f64 = 2e-3;
+
+    /// The first sample that is wholly behind the place has its middle half a period behind it.
+    #[test]
+    fn a_motion_is_judged_where_its_first_sample_is_wholly_behind_a_higher_feed() {
+        for (late_s, passes) in [
+            (-PERIOD_S, true),
+            (0.49 * PERIOD_S, true),
+            (0.51 * PERIOD_S, false),
+            (2.0 * PERIOD_S, false),
+        ] {
+            let share = share_of_feed(late_s);
+            assert_eq!(share <= 1.0, passes, "{share} where it is {late_s} s late");
+        }
     }
 }

@@ -35,6 +35,7 @@ mod report;
 mod route;
 mod timing;
 mod travel;
+mod turns;
 mod verify;
 mod waypoints;
 mod window;

@@ -146,6 +146,12 @@ fn control_of<const L: usize>(piece: &Piece<L>) -> Derivatives<L> {
     }
 }
 
+/// The control points of the velocity of a piece.
+#[inline(always)]
+pub fn velocities<const L: usize>(piece: &Piece<L>) -> [Lanes<L>; 5] {
+    control_of(piece).velocity
+}
+
 /// The control points of the position of a piece.
 pub fn positions<const L: usize>(piece: &Piece<L>) -> [Lanes<L>; 6] {
     const BINOMIAL: [[f64; 6]; 6] = [

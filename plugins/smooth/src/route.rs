@@ -166,16 +166,20 @@ impl<const L: usize> Route<L> {
         }
     }
 
-    /// The last chord of the leg in front, where the leg behind it has a lower feed.
-    pub fn last_before_lower_feed(&self) -> Option<&Chord<L>> {
+    /// The end of the leg in front, where the leg behind it has another feed, and a direction in which a motion passes it: across the
+    /// plane that halves the angle between both.
+    pub fn end_before_other_feed(&self) -> Option<(Lanes<L>, Lanes<L>)> {
         let leg = self.front()?;
         let Some(Item::Leg(next)) = self.items.get(1) else {
             return None;
         };
-        let falls = next.block.command_feed_mm_per_s() < leg.block.command_feed_mm_per_s();
-        let behind = (leg.first_chord + u64::from(leg.chords)).checked_sub(self.first)?;
-        let last = (behind as usize).checked_sub(1)?;
-        self.chords.get(last).filter(|_| falls)
+        if next.block.command_feed_mm_per_s() == leg.block.command_feed_mm_per_s() {
+            return None;
+        }
+        let behind = (leg.first_chord + u64::from(leg.chords)).checked_sub(self.first)? as usize;
+        let last = self.chords.get(behind.checked_sub(1)?)?;
+        let next = self.chords.get(behind)?;
+        Some((next.start, plus(&last.direction, 1.0, &next.direction)))
     }
 
     /// Takes a rest.
