@@ -108,3 +108,24 @@ fn the_last_nanometre_before_a_rest_is_driven_where_jerk_is_low() {
         assert!(left < 1e-9, "{form}: {left} mm/s at the rest");
     }
 }
+
+/// Over 400 mm of one axis another turns by 0.17 rad: at 0.16 rad/s² it leaves the first one all of its acceleration.
+#[test]
+fn a_slow_axis_that_moves_little_on_a_long_line_does_not_make_it_slow() {
+    let limits = |speed, acceleration, jerk| AxisLimits {
+        feed_mm_per_s: speed,
+        jerk_mm_per_s3: jerk,
+        ..tandem_rig::axis(acceleration)
+    };
+    let axes = [limits(600.0, 300.0, 1e4), limits(2.0, 0.16, 1e4)];
+    let context = tandem_rig::context(&axes, 1e-3);
+    for form in ["scan", "windowed"] {
+        let end = AxisVector::from_slice(&[400.0, 0.17]);
+        let block = line(&AxisVector::ZERO, &end, 150.0);
+        let driven = run(&format!("form = \"{form}\""), &context, &[(block, None)]);
+        // At 150 mm/s, and twice half of the time in which that is built up.
+        let least_s = 400.0 / 150.0 + 150.0 / 300.0;
+        let took_s = driven.duration_s();
+        assert!(took_s < 1.2 * least_s, "{form}: {took_s} s for {least_s}");
+    }
+}
