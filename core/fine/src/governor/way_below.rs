@@ -132,6 +132,8 @@ struct Watch {
     before: Option<Pace>,
     limit_mm_per_s: f64,
     was_below: bool,
+    /// The speed at which it began.
+    begun_mm_per_s: f64,
 }
 
 impl Watch {
@@ -141,31 +143,37 @@ impl Watch {
         let is_below = |pace: &Pace| here.sigma * pace.speed <= limit_mm_per_s * (1.0 + TOLERANCE);
         Self {
             was_below: before.as_ref().is_none_or(is_below),
+            begun_mm_per_s: here.sigma * before.map_or(0.0, |pace| pace.speed),
             before,
             limit_mm_per_s,
         }
     }
 
     /// Whether the feed is kept in a period that ends at `to`, at its end and in its mean. Where it was not before, it need not
-    /// be yet.
+    /// be yet: the ratio has just become a lower one. But then the speed does not rise any more, so that it stays below what was asked
+    /// for before.
     fn is_kept(&mut self, to: &RateState<'_>, ratio: f64, h: f64) -> bool {
         let Some(pace) = to.place.pace() else {
             self.before = None;
             return true;
         };
         let limit = ratio * to.place.feed_mm_per_s();
-        let most = limit.max(self.limit_mm_per_s) * (1.0 + TOLERANCE);
-        let kept = to.sigma * pace.speed <= limit * (1.0 + TOLERANCE)
-            && self
-                .before
-                .is_none_or(|before| before.way_to_mm(&pace) <= most * h);
+        let keeps = |at_end_mm_per_s: f64, mean_mm_per_s: f64| {
+            to.sigma * pace.speed <= at_end_mm_per_s * (1.0 + TOLERANCE)
+                && self.before.is_none_or(|before| {
+                    before.way_to_mm(&pace) <= mean_mm_per_s * (1.0 + TOLERANCE) * h
+                })
+        };
+        let kept = keeps(limit, limit.max(self.limit_mm_per_s));
         let was_below = self.was_below;
+        let goes_on = kept || !was_below && keeps(self.begun_mm_per_s, self.begun_mm_per_s);
         *self = Self {
             before: Some(pace),
             limit_mm_per_s: limit,
             was_below: was_below || kept,
+            ..*self
         };
-        kept || !was_below
+        goes_on
     }
 }
 
