@@ -445,6 +445,35 @@ mod tests {
         }
     }
 
+    /// The ratio has become a lower one: the speed need not be below it at once, but on no way does it rise beyond what it is.
+    #[test]
+    fn a_way_that_begins_above_the_feed_does_not_rise_before_it_is_below() {
+        const PERIOD_S: f64 = 1e-3;
+        let mut segment = Segment::rest(&AxisVector::ZERO, 1.0);
+        segment.coefficients[0][1] = 10.0;
+        segment.coefficients[0][2] = 50.0;
+        segment.path = segment.coefficients[0];
+        segment.feed_mm_per_s = 10.0;
+        let ahead = Ahead::new(&segment, Some(0.0), 0, None);
+        let here = RateState {
+            sigma: 0.5,
+            rate_per_s: 0.0,
+            place: ahead.place(TWO_LINEAR),
+            recent: Recent::default(),
+        };
+        // At 5 mm/s, where 4 are asked for, the plan gets faster by 5 % in ten periods.
+        for (rate_per_s, is_kept) in [(0.0, false), (-3.0, true)] {
+            let mut watch = Watch::new(&here, 0.4);
+            let mut way = RateState { rate_per_s, ..here };
+            way.pass(0.0, 10.0 * PERIOD_S);
+            let goes_on = watch.is_kept(&way, 0.4, 10.0 * PERIOD_S);
+            assert_eq!(goes_on, is_kept, "{rate_per_s}: {}", way.sigma);
+            // Below the feed it may rise.
+            let mut watch = Watch::new(&here, 0.6);
+            assert!(watch.is_kept(&way, 0.6, 10.0 * PERIOD_S));
+        }
+    }
+
     /// A plan that ends at rest with a speed that rounding has left below zero is not too fast there.
     #[test]
     fn the_rounding_of_a_rest_ahead_lowers_no_rate() {
