@@ -15,6 +15,8 @@ use tandem_sdk::{
 
 use crate::polygon::{PlaneAxis, Polygon, Timed};
 
+mod strokes;
+
 /// Blocks of a polygon before the rounds that are timed.
 const BEFORE_BLOCKS: u32 = 8;
 /// Blocks in those at least: to find where to begin, and to tell the axes apart. A round differs from the next by some percent where
@@ -94,6 +96,15 @@ impl Planned {
         made.motion.jerk = JerkMode::Limit;
         made.guard = GuardMode::Stop;
         made
+    }
+
+    /// With one acceleration and one jerk for both axes of the plane, between those.
+    fn alike(&self) -> Self {
+        let mut alike = self.clone();
+        for limits in [&mut alike.acceleration_mm_per_s2, &mut alike.jerk_mm_per_s3] {
+            *limits = [(limits[0] * limits[1]).sqrt(); MAX_AXES];
+        }
+        alike
     }
 
     /// Its constants, in a line.
@@ -300,6 +311,8 @@ const MAX_STEPS: u32 = 8;
 const PROBE: f64 = 0.03;
 /// Share by which the sum of the squares is to fall for another step, and for constants of each axis to be worth their number.
 const WORTH: f64 = 1e-2;
+/// Damping at which a step is too short to matter.
+const MAX_DAMPING: f64 = 1e2;
 const WORTH_OF_AXES: f64 = 0.8;
 /// How unequal two axes are where the search for that begins.
 const ASKEW: [f64; 3] = [0.6, 1.0, 1.0 / 0.6];
@@ -308,6 +321,11 @@ const TURNED: f64 = 4.0;
 /// Strokes along each axis with which acceleration and jerk of it are told by them alone. Their times are smooth in the constants, while
 /// those of polygons step by up to a percent where windows of the plan end elsewhere, and a search among those alone stops early.
 const TELLING_STROKES: usize = 3;
+/// Tolerances that are tried beside what strokes tell, mm: of what a control may keep, so near to each other that a search from one of them
+/// comes to those between.
+const TOLERANCES_MM: [f64; 6] = [0.001, 0.003, 0.008, 0.02, 0.05, 0.12];
+/// From so many of the starts that fit best the search goes on.
+const FOLLOWED: usize = 4;
 /// Polygons this near to their feed tell nothing of the limits.
 const AT_FEED: f64 = 0.998;
 
@@ -329,6 +347,17 @@ impl Form {
             PlannerKind::BlockOverlap => all.push(planned.time_constant_s),
         }
         all.iter().map(|value| value.ln()).collect()
+    }
+
+    /// By how much the logarithm of a constant is changed to see what it does: a time constant by whole periods, because the planner rounds
+    /// it to them.
+    fn probe(self, index: usize, logs: &[f64], period_s: f64) -> f64 {
+        if self.kind == PlannerKind::BlockOverlap && index + 1 == logs.len() {
+            let periods = (logs[index].exp() / period_s).round().max(1.0);
+            ((periods + (PROBE * periods).ceil()) / periods).ln()
+        } else {
+            PROBE
+        }
     }
 
     fn planned(self, logs: &[f64]) -> Planned {
@@ -357,7 +386,8 @@ impl Form {
     }
 }
 
-/// Fits the planner `kind` to the times of polygons, beginning at what the machine file says. Host; allocates.
+/// Fits the planner `kind` to the times of polygons. It begins where lines there and back fit best; without lines along both axes at what the
+/// machine file says. Host; allocates.
 ///
 /// # Errors
 /// The polygons cannot be planned on this machine.
@@ -381,47 +411,83 @@ pub fn fit(
         kind,
         by_axes: false,
     };
+    let fine = Fit {
+        bench: &bench(&telling, MANY_BLOCKS)?,
+        timed: &telling,
+    };
     // Where to begin a third of them says as well.
     let some: Vec<Timed> = telling.iter().step_by(3).copied().collect();
     let few = Fit {
         bench: &bench(&some, FEW_BLOCKS)?,
         timed: &some,
     };
-    let (alike, _) = rough.near(one, &few.start(one, &Planned::of(machine, kind)));
-    let fine = Fit {
-        bench: &bench(&telling, MANY_BLOCKS)?,
-        timed: &telling,
-    };
     let each = Form {
         kind,
         by_axes: true,
     };
+    let own = Planned::of(machine, kind);
     let is_stroke = |timed: &&Timed| timed.polygon.is_stroke();
     let strokes: Vec<Timed> = telling.iter().filter(is_stroke).copied().collect();
     let along = |axis| strokes.iter().filter(|t| t.polygon.along == axis).count();
     let tell_axes = [PlaneAxis::X, PlaneAxis::Y]
         .into_iter()
         .all(|axis| along(axis) >= TELLING_STROKES);
-    let of_axes = if tell_axes {
-        let alone = Fit {
-            bench: &bench(&strokes, FEW_BLOCKS)?,
-            timed: &strokes,
-        };
-        Some(fine.near(each, &alone.near(each, &alike).0))
+    let found = if tell_axes {
+        let starts = strokes::starts(&own, &strokes);
+        from_strokes([&few, &rough, &fine], [one, each], &starts).ok_or("no lines are timed")?
     } else {
+        let alike = rough.near(one, &few.start(one, &own)).planned;
         without_strokes(&rough, &fine, each, &alike)
+            .filter(|of_axes| is_worth(of_axes, fine.square(&alike)))
+            .map_or(alike, |of_axes| of_axes.planned)
     };
-    let worth = |of_axes: &(Planned, f64)| of_axes.1 < WORTH_OF_AXES.powi(2) * fine.square(&alike);
-    let found = of_axes
-        .filter(worth)
-        .map_or_else(|| alike.clone(), |(planned, _)| planned);
     let times_s = bench(timed, MANY_BLOCKS)?.times_s(&found)?;
     Ok((found, times_s))
 }
 
+/// Whether constants for each axis leave so much less than the squares of those for both that they are worth their number.
+fn is_worth(of_axes: &Found, alike: f64) -> bool {
+    of_axes.square < WORTH_OF_AXES.powi(2) * alike
+}
+
+/// The best constants from `starts` that lines there and back tell, with two forms: alike for both axes, and for each its own.
+fn from_strokes(
+    [few, rough, fine]: [&Fit; 3],
+    [one, each]: [Form; 2],
+    starts: &[Planned],
+) -> Option<Planned> {
+    let of_axes = few.near_one_of(each, starts)?;
+    let mut start = of_axes.planned.clone();
+    // A few polygons tell the tolerance, and what lines leave open. Their times are rougher than those of lines.
+    if let [told] = starts {
+        start = Planned {
+            path_tolerance_mm: start.path_tolerance_mm,
+            ..told.clone()
+        };
+    }
+    let alike = few.near(one, &start.alike());
+    Some(if is_worth(&of_axes, alike.square) {
+        settle(rough, fine, each, &start)
+    } else {
+        settle(rough, fine, one, &start.alike())
+    })
+}
+
+/// The best constants near `start`: fewer blocks of the same polygons tell the slopes in half the time.
+fn settle(rough: &Fit, fine: &Fit, form: Form, start: &Planned) -> Planned {
+    let slopes = |logs: &[f64], here: &[f64]| {
+        let there = rough.residuals(&form.planned(logs));
+        there.map_or_else(
+            || fine.slopes(form, logs, here),
+            |there| rough.slopes(form, logs, &there),
+        )
+    };
+    fine.search(form, start, slopes).planned
+}
+
 /// The best constants for each axis that polygons alone tell, and the squares that they leave. They lie askew, and so they tell which
 /// axis is the weaker one; it may be so in one limit and not in the other.
-fn without_strokes(rough: &Fit, fine: &Fit, each: Form, alike: &Planned) -> Option<(Planned, f64)> {
+fn without_strokes(rough: &Fit, fine: &Fit, each: Form, alike: &Planned) -> Option<Found> {
     let factors = ASKEW.iter().flat_map(|a| ASKEW.map(|j| [*a, j]));
     let counts = |[a, j]: &[f64; 2]| match each.kind {
         PlannerKind::Smooth => [*a, *j] != [1.0; 2],
@@ -433,14 +499,25 @@ fn without_strokes(rough: &Fit, fine: &Fit, each: Form, alike: &Planned) -> Opti
     let (_, start) = starts.min_by(|(one, _), (other, _)| one.total_cmp(other))?;
     let found = fine.near(each, &start);
     // Two axes exchanged make nearly the same times.
-    let mut turned = found.0.clone();
+    let mut turned = found.planned.clone();
     turned.acceleration_mm_per_s2.swap(0, 1);
     turned.jerk_mm_per_s3.swap(0, 1);
-    if fine.square(&turned) >= TURNED * found.1 {
+    if fine.square(&turned) >= TURNED * found.square {
         return Some(found);
     }
     let other = fine.near(each, &turned);
-    Some(if other.1 < found.1 { other } else { found })
+    Some(if other.square < found.square {
+        other
+    } else {
+        found
+    })
+}
+
+/// The best constants near a start.
+struct Found {
+    planned: Planned,
+    /// The sum of the squares that they leave.
+    square: f64,
 }
 
 /// What is fitted to what.
@@ -490,6 +567,28 @@ impl Fit<'_> {
         best.map_or(from.clone(), |(_, start)| start)
     }
 
+    /// The best constants of `form` near the best of some `starts`, each of which gets one of a few tolerances.
+    fn near_one_of(&self, form: Form, starts: &[Planned]) -> Option<Found> {
+        let of_tolerances = starts.iter().map(|start| {
+            let tried = TOLERANCES_MM.map(|path_tolerance_mm| {
+                let start = Planned {
+                    path_tolerance_mm,
+                    ..start.clone()
+                };
+                (self.square(&start), start)
+            });
+            let best = tried
+                .into_iter()
+                .min_by(|one, other| one.0.total_cmp(&other.0));
+            best.unwrap_or_else(|| (f64::INFINITY, start.clone()))
+        });
+        let mut tried: Vec<_> = of_tolerances.collect();
+        tried.sort_by(|(one, _), (other, _)| one.total_cmp(other));
+        let followed = tried.iter().take(FOLLOWED);
+        let found = followed.map(|(_, start)| self.near(form, start));
+        found.min_by(|one, other| one.square.total_cmp(&other.square))
+    }
+
     /// `alike` with two unequal axes whose times are as long in the mean, and the squares that it leaves.
     fn askew(&self, alike: &Planned, [a, j]: [f64; 2]) -> (f64, Planned) {
         let mut start = alike.clone();
@@ -509,25 +608,45 @@ impl Fit<'_> {
         (squares, start)
     }
 
-    /// The constants of `form` that fit best near `start`, and the sum of the squares that they leave: damped Gauss-Newton steps.
-    fn near(&self, form: Form, start: &Planned) -> (Planned, f64) {
+    /// The constants of `form` that fit best near `start`.
+    fn near(&self, form: Form, start: &Planned) -> Found {
+        self.search(form, start, |logs, here| self.slopes(form, logs, here))
+    }
+
+    /// How the residuals `here` change with each constant.
+    fn slopes(&self, form: Form, logs: &[f64], here: &[f64]) -> DMatrix<f64> {
+        let mut slopes = DMatrix::zeros(here.len(), logs.len());
+        for index in 0..logs.len() {
+            let probe = form.probe(index, logs, self.bench.machine.fine_period_s);
+            let mut moved = logs.to_vec();
+            moved[index] += probe;
+            let there = self.residuals(&form.planned(&moved)).unwrap_or_default();
+            for (row, (there, here)) in there.iter().zip(here).enumerate() {
+                slopes[(row, index)] = (there - here) / probe;
+            }
+        }
+        slopes
+    }
+
+    /// The constants of `form` that fit best near `start`, by damped Gauss-Newton steps with the `slopes` at logarithms and residuals.
+    fn search(
+        &self,
+        form: Form,
+        start: &Planned,
+        slopes: impl Fn(&[f64], &[f64]) -> DMatrix<f64>,
+    ) -> Found {
         let first = form.logs(start);
         let mut logs = first.clone();
         let Some(mut here) = self.residuals(&form.planned(&logs)) else {
-            return (start.clone(), f64::INFINITY);
+            return Found {
+                planned: start.clone(),
+                square: f64::INFINITY,
+            };
         };
         let square = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>();
         let mut damping = 1e-2;
         'steps: for _ in 0..MAX_STEPS {
-            let mut jacobian = DMatrix::zeros(here.len(), logs.len());
-            for index in 0..logs.len() {
-                let mut moved = logs.clone();
-                moved[index] += PROBE;
-                let there = self.residuals(&form.planned(&moved)).unwrap_or_default();
-                for (row, (there, here)) in there.iter().zip(&here).enumerate() {
-                    jacobian[(row, index)] = (there - here) / PROBE;
-                }
-            }
+            let jacobian = slopes(&logs, &here);
             let gradient = jacobian.transpose() * DVector::from_column_slice(&here);
             let normal = jacobian.transpose() * &jacobian;
             loop {
@@ -558,11 +677,14 @@ impl Fit<'_> {
                     break;
                 }
                 damping *= 6.0;
-                if damping > 1e4 {
+                if damping > MAX_DAMPING {
                     break 'steps;
                 }
             }
         }
-        (form.planned(&logs), square(&here))
+        Found {
+            planned: form.planned(&logs),
+            square: square(&here),
+        }
     }
 }
