@@ -133,7 +133,7 @@ impl Slowdowns {
     }
 
     fn see(&mut self, segment: &Segment) {
-        let moves = !segment.flags.contains(SegmentFlags::DWELL) && segment.duration_s > 0.0;
+        let moves = moves(segment);
         if moves && segment.feed_mm_per_s < self.feed_mm_per_s {
             self.mark(Slowdown {
                 path_mm: segment.path[0],
@@ -176,8 +176,17 @@ impl Slowdowns {
     }
 }
 
+/// The end of a line at which single-block operation stops.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EndOfLine {
+    /// Path coordinate, mm.
+    pub path_mm: f64,
+    /// Least path deceleration that the plan leaves on the way there, mm/s².
+    pub stop_deceleration_mm_per_s2: f64,
+}
+
 /// Where single-block operation stops next.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct LineEnd {
     /// Number of the entry to look at next.
     next: u64,
@@ -185,48 +194,82 @@ pub struct LineEnd {
     line: u32,
     /// Whether the plan rests there by itself.
     rests: bool,
-    /// Path coordinate of the end chosen, mm.
-    chosen_mm: Option<f64>,
+    /// Least deceleration that the plan leaves in the entries up to there since the last end, mm/s².
+    stop_deceleration_mm_per_s2: f64,
+    /// The end chosen.
+    chosen: Option<EndOfLine>,
+}
+
+impl Default for LineEnd {
+    fn default() -> Self {
+        Self {
+            next: 0,
+            line: 0,
+            rests: false,
+            stop_deceleration_mm_per_s2: f64::INFINITY,
+            chosen: None,
+        }
+    }
 }
 
 impl LineEnd {
     /// Forgets the end chosen: the next one is looked for.
     pub fn forget(&mut self) {
-        self.chosen_mm = None;
+        self.chosen = None;
     }
 
     /// Whether the end chosen lies behind the machine, which did not come to rest there.
     pub fn is_passed(&self, cursor: &Cursor) -> bool {
-        self.chosen_mm
-            .is_some_and(|end_mm| end_mm < cursor.path_mm())
+        self.chosen
+            .is_some_and(|end| end.path_mm < cursor.path_mm())
     }
 
-    /// The nearest end of a line at which the plan goes on and the machine can stop when it needs `way_mm` for it.
-    pub fn look(&mut self, cursor: &mut Cursor, way_mm: f64) -> Option<f64> {
+    /// The nearest end of a line at which the plan goes on and the machine can stop. `way_mm` says how long the way is that it needs for
+    /// that with a path deceleration, mm/s².
+    pub fn look(&mut self, cursor: &mut Cursor, way_mm: impl Fn(f64) -> f64) -> Option<EndOfLine> {
         let here_mm = cursor.path_mm();
-        if self.chosen_mm.is_none_or(|end_mm| end_mm < here_mm) {
-            self.chosen_mm = None;
+        if self.chosen.is_none_or(|end| end.path_mm < here_mm) {
+            self.chosen = None;
             let overtaken = self.next < cursor.next_number();
             if overtaken {
-                (self.next, self.line) = (cursor.next_number(), cursor.segment().line);
+                self.next = cursor.next_number();
+                self.line = cursor.segment().line;
+                self.stop_deceleration_mm_per_s2 = f64::INFINITY;
             }
-            let nearest_mm = here_mm + way_mm;
+            let here_mm_per_s2 = cursor.segment().stop_deceleration_mm_per_s2;
             for queued in cursor.ahead().entries_from(self.next).take(ENTRIES) {
                 if let Queued::Segment { segment, .. } = queued {
-                    let ended =
-                        segment.line != self.line && !self.rests && segment.path[0] >= nearest_mm;
+                    let end = EndOfLine {
+                        path_mm: segment.path[0],
+                        stop_deceleration_mm_per_s2: here_mm_per_s2
+                            .min(self.stop_deceleration_mm_per_s2),
+                    };
+                    let ended = segment.line != self.line
+                        && !self.rests
+                        && end.path_mm >= here_mm + way_mm(end.stop_deceleration_mm_per_s2);
                     self.line = segment.line;
                     self.rests = ends(segment);
                     if ended {
-                        self.chosen_mm = Some(segment.path[0]);
+                        self.chosen = Some(end);
+                        self.stop_deceleration_mm_per_s2 = f64::INFINITY;
                         break;
+                    }
+                    if moves(segment) {
+                        self.stop_deceleration_mm_per_s2 = self
+                            .stop_deceleration_mm_per_s2
+                            .min(segment.stop_deceleration_mm_per_s2);
                     }
                 }
                 self.next += 1;
             }
         }
-        self.chosen_mm
+        self.chosen
     }
+}
+
+/// Whether the path goes on in a segment: what others leave to brake with says nothing.
+fn moves(segment: &Segment) -> bool {
+    !segment.flags.contains(SegmentFlags::DWELL) && segment.duration_s > 0.0
 }
 
 #[cfg(test)]
@@ -415,8 +458,36 @@ mod tests {
             }
             let mut cursor = Cursor::new(output, &AxisVector::ZERO);
             cursor.advance(0.5, |_| false);
-            assert_eq!(LineEnd::default().look(&mut cursor, 0.0), expected);
+            let end = LineEnd::default().look(&mut cursor, |_| 0.0);
+            assert_eq!(end.map(|end| end.path_mm), expected);
         }
+    }
+
+    /// A machine at 2 mm/s that turns on next to no path behind the second line.
+    #[test]
+    fn what_is_left_behind_the_end_of_a_line_says_nothing_of_the_stop_there() {
+        let (mut input, output) = RingBuffer::new(4);
+        for (line, leaves_mm_per_s2) in [(1, 40.0), (2, 10.0), (3, 0.02), (4, 50.0)] {
+            let mut segment = Segment::rest(&AxisVector::ZERO, 1.0);
+            segment.line = line;
+            segment.flags = SegmentFlags::default();
+            segment.path = [f64::from(line - 1), 1.0, 0.0, 0.0, 0.0, 0.0];
+            segment.stop_deceleration_mm_per_s2 = leaves_mm_per_s2;
+            let start_s = 0.0;
+            input.push(Queued::Segment { start_s, segment }).unwrap();
+        }
+        let mut cursor = Cursor::new(output, &AxisVector::ZERO);
+        cursor.advance(0.97, |_| false);
+        let mut line_end = LineEnd::default();
+        let mut look = |way_mm: f64| {
+            line_end
+                .look(&mut cursor, |leaves_mm_per_s2| {
+                    way_mm + 2.0 / leaves_mm_per_s2
+                })
+                .map(|end| (end.path_mm, end.stop_deceleration_mm_per_s2))
+        };
+        assert_eq!(look(0.0), Some((2.0, 10.0)), "the first end is too near");
+        assert_eq!(look(9.0), Some((2.0, 10.0)), "what is chosen stays");
     }
 
     /// A feed that is lower with every mm, seen ten of them ahead: more marks come past than there is room for at once.

@@ -17,7 +17,7 @@ use crate::horizon::Horizon;
 use crate::law::Along;
 use crate::period_points::PeriodPoints;
 use crate::plan_ahead::Axes;
-use crate::slowdowns::{LineEnd, Slowdowns};
+use crate::slowdowns::{EndOfLine, LineEnd, Slowdowns};
 
 /// Why the rate of program time is to go down.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -209,28 +209,28 @@ impl PlanFollower {
             ratios.feed /= longer;
             ratios.mean_feed /= longer;
         }
-        let end_mm = if ask == Ask::Run {
+        let line_end = if ask == Ask::Run {
             self.line_end()
         } else {
             None
         };
         let way_speed = if ask == Ask::Run {
-            self.speed_for_places(&ratios, end_mm)
+            self.speed_for_places(&ratios, line_end)
         } else {
             0.0
         };
         let delta_s = if self.order >= 3 {
-            self.govern_smooth(ask, &ratios, way_speed, end_mm)
+            self.govern_smooth(ask, &ratios, way_speed, line_end)
         } else {
             self.govern_steep(ask, &ratios, way_speed)
         };
         let limited = self.request.max_rate < 1.0;
-        let asked = ask != Ask::Run || below || ratios.rapid < 1.0 || end_mm.is_some() || limited;
+        let asked = ask != Ask::Run || below || ratios.rapid < 1.0 || line_end.is_some() || limited;
         let sigma = self.governor.sigma();
         self.chosen.is_queue_limited = limited && ask == Ask::Run && sigma < 1.0;
         self.recovering = asked || (self.recovering && sigma < 1.0);
         self.chosen.is_unasked = sigma < 1.0 && !self.recovering;
-        self.stop_at_line_end(end_mm);
+        self.stop_at_line_end(line_end);
         self.covered(delta_s)
     }
 
@@ -365,7 +365,7 @@ impl PlanFollower {
         ask: Ask,
         ratios: &Ratios,
         way_speed_mm_per_s: f64,
-        end_mm: Option<f64>,
+        line_end: Option<EndOfLine>,
     ) -> f64 {
         if ask == Ask::Run && self.cursor.is_resting() {
             self.begin_below(ratios);
@@ -400,7 +400,7 @@ impl PlanFollower {
         };
         let goal = match ask {
             Ask::Run => {
-                let rest_at = end_mm.map(|end_mm| self.rest_at(end_mm));
+                let rest_at = line_end.map(|end| self.rest_at(&end));
                 Goal::run(run, feed.min(way_speed_mm_per_s), rest_at)
             }
             // Where the plan stands still, its path says nothing.
@@ -601,9 +601,9 @@ impl PlanFollower {
     }
 
     /// The speed at the end of this period from which every lower feed ahead, and the end of the line, can be met, mm/s.
-    fn speed_for_places(&mut self, ratios: &Ratios, end_mm: Option<f64>) -> f64 {
-        let at_end = end_mm.map_or(f64::INFINITY, |end_mm| self.speed_to_rest(end_mm));
-        if end_mm.is_some() {
+    fn speed_for_places(&mut self, ratios: &Ratios, line_end: Option<EndOfLine>) -> f64 {
+        let at_end = line_end.map_or(f64::INFINITY, |end| self.speed_to_rest(&end));
+        if line_end.is_some() {
             self.ask_for_rate(0.0);
         }
         if ratios.feed >= self.max_feed_ratio {
@@ -624,10 +624,7 @@ impl PlanFollower {
         let mut least_met_mm_per_s = f64::INFINITY;
         for (mark, leaves_mm_per_s2) in to_meet {
             let met_mm_per_s = mark.speed_to_meet_mm_per_s(ratios.feed, self.period_s);
-            let braking = Along {
-                max_mm_per_s2: STOP_SHARE * leaves_mm_per_s2,
-                ..along
-            };
+            let braking = braking_with(&along, leaves_mm_per_s2);
             speed_mm_per_s =
                 speed_mm_per_s.min(self.speed_towards(&braking, mark.path_mm, met_mm_per_s));
             least_met_mm_per_s = least_met_mm_per_s.min(met_mm_per_s);
@@ -663,7 +660,7 @@ impl PlanFollower {
     }
 
     /// In single-block operation: where to come to rest, as a path coordinate, mm.
-    fn line_end(&mut self) -> Option<f64> {
+    fn line_end(&mut self) -> Option<EndOfLine> {
         if !self.request.single_block {
             self.line_end.forget();
             return None;
@@ -678,47 +675,57 @@ impl PlanFollower {
             return None;
         }
         let along = self.along();
-        let way_mm = if self.order >= 3 {
-            let rest = self.rest_at(f64::INFINITY);
-            let stop = Along {
-                jerk_mm_per_s3: rest.jerk_mm_per_s3,
-                ..along
-            };
-            stop.way_to_mm(0.0)
-        } else {
-            along.speed_mm_per_s * along.speed_mm_per_s / (2.0 * along.max_mm_per_s2)
-        };
         let soon_mm = LINE_END_LOOK_PERIODS * self.period_s * along.speed_mm_per_s;
-        self.line_end.look(&mut self.cursor, way_mm + soon_mm)
+        let jerk_mm_per_s3 = self.line_end_jerk_mm_per_s3();
+        let is_smooth = self.order >= 3;
+        let way_mm = |leaves_mm_per_s2: f64| {
+            let stop = Along {
+                jerk_mm_per_s3,
+                ..braking_with(&along, leaves_mm_per_s2)
+            };
+            soon_mm
+                + if is_smooth {
+                    stop.way_to_mm(0.0)
+                } else {
+                    stop.speed_mm_per_s * stop.speed_mm_per_s / (2.0 * stop.max_mm_per_s2)
+                }
+        };
+        self.line_end.look(&mut self.cursor, way_mm)
     }
 
     /// The speed at the end of this period from which rest can be met at the end of the line, mm/s; with a jerk limit σ̈ is sought
     /// for it instead, until the end is next to reached.
-    fn speed_to_rest(&self, end_mm: f64) -> f64 {
+    fn speed_to_rest(&self, end: &EndOfLine) -> f64 {
         if self.order < 3 {
-            return self.speed_towards(&self.along(), end_mm, 0.0);
+            let along = braking_with(&self.along(), end.stop_deceleration_mm_per_s2);
+            return self.speed_towards(&along, end.path_mm, 0.0);
         }
-        if end_mm - self.cursor.path_mm() > AT_LINE_END_MM {
+        if end.path_mm - self.cursor.path_mm() > AT_LINE_END_MM {
             f64::INFINITY
         } else {
             0.0
         }
     }
 
-    /// Rest at `path_mm` with what braking there may count on. Jerk is limited.
-    fn rest_at(&self, path_mm: f64) -> RestAt {
-        let share = LINE_END_JERK_SHARES[usize::from(self.horizon.is_steady())];
+    /// Rest at the end of a line with what braking there may count on. Jerk is limited.
+    fn rest_at(&self, end: &EndOfLine) -> RestAt {
         RestAt {
-            path_mm,
-            max_mm_per_s2: self.along().max_mm_per_s2,
-            jerk_mm_per_s3: share * self.horizon.path_jerk_mm_per_s3,
+            path_mm: end.path_mm,
+            max_mm_per_s2: STOP_SHARE * end.stop_deceleration_mm_per_s2,
+            jerk_mm_per_s3: self.line_end_jerk_mm_per_s3(),
         }
     }
 
+    /// The path jerk that braking for the end of a line may count on, mm/s³.
+    fn line_end_jerk_mm_per_s3(&self) -> f64 {
+        LINE_END_JERK_SHARES[usize::from(self.horizon.is_steady())]
+            * self.horizon.path_jerk_mm_per_s3
+    }
+
     /// The end of the line is reached: a feed hold stands until the operator resumes.
-    fn stop_at_line_end(&mut self, end_mm: Option<f64>) {
-        let Some(end_mm) = end_mm else { return };
-        if self.governor.sigma() == 0.0 && end_mm - self.cursor.path_mm() < LINE_END_MM {
+    fn stop_at_line_end(&mut self, line_end: Option<EndOfLine>) {
+        let Some(end) = line_end else { return };
+        if self.governor.sigma() == 0.0 && end.path_mm - self.cursor.path_mm() < LINE_END_MM {
             self.chosen.holds = true;
             self.line_end.forget();
         }
@@ -740,6 +747,14 @@ impl PlanFollower {
             max_mm_per_s2: STOP_SHARE * self.request.stop_deceleration_mm_per_s2,
             jerk_mm_per_s3: BRAKING_JERK_SHARE * self.horizon.path_jerk_mm_per_s3,
         }
+    }
+}
+
+/// The same state where the plan leaves this path deceleration to brake with, mm/s².
+fn braking_with(along: &Along, leaves_mm_per_s2: f64) -> Along {
+    Along {
+        max_mm_per_s2: STOP_SHARE * leaves_mm_per_s2,
+        ..*along
     }
 }
 
