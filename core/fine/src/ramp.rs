@@ -337,6 +337,20 @@ mod tests {
         }
     }
 
+    /// A double far from zero is as coarse as its last digit: what that makes of a straight line is one, and the same near zero is none.
+    #[test]
+    fn what_rounding_makes_of_a_line_far_from_zero_is_a_line() {
+        const FAR_MM: f64 = 1000.0;
+        let is_line = |position_mm: f64| {
+            let mut ramp = ramp([100.0, 50.0], [-10.0, -5.0], 0.01);
+            ramp.acceleration[1] += 2.0 * f64::EPSILON * FAR_MM / ramp.period_s.powi(2);
+            ramp.position = AxisVector([position_mm; MAX_AXES]);
+            Line::new(&ramp, 2).is_some()
+        };
+        assert!(is_line(FAR_MM));
+        assert!(!is_line(1.0));
+    }
+
     proptest! {
         /// From any state within the limits, every entry keeps them, and a sum of axes stays their sum.
         #[test]

@@ -206,7 +206,10 @@ mod tests {
         let used = sigma.powi(3) * 900.0;
         assert!((f64::midpoint(left(0.5, 900.0), used) - (most - step)).abs() < 1e-9);
         assert!((left(0.5, 200.0) - (most - step)).abs() < 1e-9);
-        // What comes before a short segment may use all of the limit.
+        // What comes before a segment that is shorter than samples look at this rate may use all of the limit.
+        let seen_s = f64::from(AROUND) * sigma * period_s;
+        assert!((left(seen_s + 1e-9, 200.0) - (most - step)).abs() < 1e-9);
+        assert!((left(seen_s - 1e-9, 200.0) - (most - 2.0 * step)).abs() < 1e-9);
         assert!((left(0.01, 200.0) - (most - 2.0 * step)).abs() < 1e-9);
     }
 

@@ -407,4 +407,42 @@ mod tests {
             assert!(says, "{wrong:?}");
         }
     }
+
+    #[test]
+    fn a_name_has_one_to_64_letters_digits_and_underscores() {
+        for name in ["a", "_", "Gain_2", "x".repeat(64).as_str()] {
+            assert!(is_name(name), "{name}");
+        }
+        for name in ["", "a b", "a-b", "\u{e4}", "x".repeat(65).as_str()] {
+            assert!(!is_name(name), "{name}");
+        }
+    }
+
+    /// What is said of a table of so many parameters of so many bytes at the start of a memory of this size.
+    fn refused(count: u32, bytes: u32, memory: usize) -> String {
+        let at = |field: usize| {
+            Ok(match field {
+                abi::layout::PARAMETER_COUNT => count,
+                abi::layout::PARAMETER_BYTES => bytes,
+                _ => 0,
+            })
+        };
+        Table::read(&vec![0; memory], &at, 1)
+            .err()
+            .map(|why| why.to_string())
+            .unwrap_or_default()
+    }
+
+    #[test]
+    fn a_table_of_parameters_has_as_many_as_are_allowed_and_lies_inside_the_memory() {
+        let (bytes, most) = (at::BYTES as u32, MAX_PARAMETERS);
+        let whole = at::BYTES * most as usize;
+        let why = refused(most + 1, bytes, 2 * whole);
+        assert!(why.contains("65 parameters, 64 are allowed"), "{why}");
+        let why = refused(most, bytes, whole - 1);
+        assert!(why.contains("the table of parameters"), "{why}");
+        // Where the table fits what is in it is looked at: names of nothing.
+        let why = refused(most, bytes, whole);
+        assert!(!why.contains("table") && !why.contains("allowed"), "{why}");
+    }
 }

@@ -530,6 +530,71 @@ pub(super) mod tests {
         }
     }
 
+    /// What turns Y round is a part of its jerk too, by how fast the rate changes: from the same velocity and acceleration it is driven
+    /// with the same jerk.
+    #[test]
+    fn the_acceleration_of_the_plan_counts_in_the_stop_of_the_slowest_axis() {
+        const SIGMA: f64 = 0.5;
+        let mut limits = limits(1000.0, 1e6);
+        limits[1].jerk_mm_per_s3 = 1000.0;
+        let path = [50.0, 0.0, 0.0];
+        let driven = |turning: f64| {
+            let mut segment = along_x(path, 0.2);
+            segment.coefficients[1] = [0.0, 0.5, turning / 2.0, 0.0, 0.0, 0.0];
+            let ahead = Ahead::new(&segment, Some(0.0), 0, None);
+            let mut horizon = Horizon::new(&limits, 2, PERIOD_S);
+            horizon.fill(&ahead, PERIOD_S);
+            let mut governor = Governor::new(&limits, 2, PERIOD_S);
+            // Y accelerates by 20 mm/s².
+            let rate_per_s = (20.0 - SIGMA * SIGMA * turning) / 0.5;
+            (governor.sigma, governor.rate_per_s) = (SIGMA, rate_per_s);
+            let place = ahead.place(TWO_LINEAR);
+            let change = governor.wanted_by_slowest(&to_rest_from(path), &horizon, &place);
+            3.0 * SIGMA * turning * rate_per_s + 0.5 * change
+        };
+        let without = driven(80.0);
+        assert!(without.is_finite(), "Y decides");
+        for turning in [81.0, 82.0, 84.0] {
+            let with = driven(turning);
+            assert!(
+                (with - without).abs() < 1e-6,
+                "{turning}: {with}, {without}"
+            );
+        }
+    }
+
+    /// On a line the path and its axes need the same time to rest but for rounding, and of a stop in a few periods a fifth is less than one:
+    /// an axis decides where it needs so much more, and two periods.
+    #[test]
+    fn an_axis_decides_how_a_stop_begins_where_it_needs_clearly_longer_than_the_path() {
+        const SIGMA: f64 = 0.5;
+        let path = [50.0, 100.0, 0.0];
+        let mut is_near = [false; 2];
+        for n in 0..200 {
+            let mut limits = limits(1e6, 1e6);
+            limits[1].jerk_mm_per_s3 = 1e6 * 0.95f64.powi(n);
+            let mut segment = along_x(path, 0.2);
+            segment.coefficients[1] = [0.0, 0.5, 50.0, 0.0, 0.0, 0.0];
+            let ahead = Ahead::new(&segment, Some(0.0), 0, None);
+            let mut horizon = Horizon::new(&limits, 2, PERIOD_S);
+            horizon.fill(&ahead, PERIOD_S);
+            let mut governor = Governor::new(&limits, 2, PERIOD_S);
+            (governor.sigma, governor.rate_per_s) = (SIGMA, -0.5);
+            let (speed, along) = (SIGMA * path[0], SIGMA * SIGMA * path[1] - 0.5 * path[0]);
+            let jerk = ORDER3_LIMIT_SHARE * horizon.path_jerk_to_rest(SIGMA, speed, along);
+            let path_s = stop_s(speed, along, f64::INFINITY, jerk);
+            let changing = SIGMA * SIGMA * 100.0 - 0.5 * 0.5;
+            let jerk = ORDER3_LIMIT_SHARE * limits[1].jerk_mm_per_s3;
+            let axis_s = stop_s(0.5 * SIGMA, changing, 1e6, jerk);
+            let more = (axis_s - CLEARLY_LONGER * path_s) / PERIOD_S;
+            let place = ahead.place(TWO_LINEAR);
+            let wanted = governor.wanted_by_slowest(&to_rest_from(path), &horizon, &place);
+            assert_eq!(wanted.is_finite(), more > 2.0, "{more} periods");
+            is_near[usize::from(more > 2.0)] |= (more - 2.0).abs() < 2.0;
+        }
+        assert_eq!(is_near, [true; 2]);
+    }
+
     /// Where no way is known a rate becomes constant at once, or by as much as the jerk limit allows; neither is beyond the limit.
     #[test]
     fn a_rate_without_a_way_becomes_constant_within_the_jerk_limit() {

@@ -178,6 +178,17 @@ fn the_way_of_a_period_is_longer_by_what_the_axes_go_beyond_the_path() {
         let longer = follower.longer();
         assert!((longer - expected).abs() < 1e-9, "{x_speed}: {longer}");
     }
+    // From 10 mm/s on the axis gets faster than the path: of a period at half the rate that is 0.003, and a whole one sees twice of it.
+    for (sigma, more) in [(0.5, 0.003), (1.0, 0.006)] {
+        let mut line = segment([1.0, 10.0, 0.0, 0.0, 0.0, 0.0], 10.0, 1.0);
+        line.coefficients[0] = [0.6, -2.0, 60.0, 0.0, 0.0, 0.0];
+        let mut follower = follower(2, &[line]);
+        follower.cursor.advance(0.1, |_| false);
+        follower.governor.jump(sigma);
+        let longer = follower.longer();
+        let expected = 1.0 + (1.0 + LONGER_MARGIN) * more;
+        assert!((longer - expected).abs() < 1e-6, "{sigma}: {longer}");
+    }
 }
 
 /// The plan gets from 5 to 6 mm/s in a period, by way of 5.5 in the mean; the feed is 5.2.
@@ -258,6 +269,28 @@ fn a_rate_that_a_lower_ratio_of_rapids_asks_for_is_not_unasked() {
             assert_eq!(chosen.is_unasked, is_unasked, "{order} {ratio}");
             let sigma = follower.governor.sigma();
             assert_eq!(sigma > 0.6, is_unasked, "{order} {ratio}: {sigma}");
+        }
+    }
+}
+
+/// A queue that is too short for the whole rate is the cause where the machine is slower for it, and not where it is held.
+#[test]
+fn the_queue_limits_a_rate_where_it_is_lower_for_it_and_nothing_stops_the_machine() {
+    let line = segment([0.0, 20.0, 0.0, 0.0, 0.0, 0.0], 20.0, 1.0);
+    for order in [2, 3] {
+        for (ask, max_rate, is_limited) in [
+            (Ask::Run, 0.5, true),
+            (Ask::Run, 1.0, false),
+            (Ask::Hold, 0.5, false),
+        ] {
+            let mut follower = follower(order, &[line]);
+            follower.cursor.advance(0.1, |_| false);
+            follower.governor.jump(0.6);
+            let chosen = follower.govern(Request {
+                max_rate,
+                ..request(ask)
+            });
+            assert_eq!(chosen.is_queue_limited, is_limited, "{order} {max_rate}");
         }
     }
 }

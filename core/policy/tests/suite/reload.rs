@@ -1,6 +1,6 @@
 //! Another script in the place of the one that runs.
 
-use tandem_policy::{Budget, Instance, Period, Policy};
+use tandem_policy::{Bounds, Budget, Facts, Instance, Period, Policy};
 
 use crate::hostile::half_feed_but;
 use crate::{chain, compile, decide, read, start, values};
@@ -128,4 +128,29 @@ fn parameters_of_the_machine_file_reach_the_new_script() {
             .unwrap_err()
             .contains("no parameter")
     );
+}
+
+/// An instance that takes the place of another is made with the same budget.
+#[test]
+fn a_policy_says_what_an_instance_may_use_and_how_much_its_calls_have() {
+    let budget = Budget {
+        fuel_per_call: 5000,
+        fuel_per_block: 300,
+        memory_pages: 3,
+    };
+    let script = compile(&read("tests/fixtures/policies/good/half-feed.wat")).unwrap();
+    let instance = Instance::new(&script, &budget, &values(&[])).unwrap();
+    assert_eq!(instance.memory_pages(), 1, "as its module states");
+    let fuel_of = |blocks: usize| {
+        let (bounds, facts) = (Bounds::default(), Facts::default());
+        let mut policy = Policy::new(script.clone(), values(&[]), budget, bounds, &facts).unwrap();
+        assert_eq!(*policy.budget(), budget);
+        decide(&mut policy, &chain(&vec![0.0; blocks]));
+        policy.counters().max_window_fuel
+    };
+    let (one, nine) = (fuel_of(1), fuel_of(9));
+    assert!(one > 0 && nine < budget.window(9), "{one}, {nine}");
+    // Each block takes it the same number of instructions, and these are some.
+    let each = (nine - one) / 8;
+    assert!(each > 5 && (nine - one).is_multiple_of(8), "{one}, {nine}");
 }
