@@ -259,8 +259,8 @@ impl Least {
             }
             // A joint that is a sum of axes may move further than the path; so may a rotary axis, where a place at which the
             // linear ones nearly stand still says nothing of the others. On a curve an axis that moves less at these places may move
-            // more between them; on a line it does not: a table of a slow start, that turns by 10 degrees while another axis goes
-            // 400 mm, would else take 100 s for one.
+            // more between them; on a line it does not, and a heavy table that turns a little while another axis goes a long way must
+            // not slow that down as if it turned by as much.
             let joint = axis >= bounds.context.axes.count();
             let most = along.iter().copied().fold(0.0, f64::max);
             let share = if course.is_straight() {
