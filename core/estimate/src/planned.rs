@@ -433,8 +433,13 @@ pub fn fit(
         .into_iter()
         .all(|axis| along(axis) >= TELLING_STROKES);
     let found = if tell_axes {
-        let starts = strokes::starts(&own, &strokes);
-        from_strokes([&few, &rough, &fine], [one, each], &starts).ok_or("no lines are timed")?
+        let starts = strokes::starts(&own, &strokes, machine.fine_period_s);
+        if starts.tell_jerk {
+            from_strokes([&few, &rough, &fine], [one, each], &starts.all)
+        } else {
+            starts.all.into_iter().next()
+        }
+        .ok_or("no lines are timed")?
     } else {
         let alike = rough.near(one, &few.start(one, &own)).planned;
         without_strokes(&rough, &fine, each, &alike)

@@ -7,7 +7,7 @@
 //! is the leaky bucket that judge and guard keep. Inside a block the rate is `(v_s·Δu_s + v_e·Δu_e)/(2·t)`, signed, so
 //! that a zigzag pays for its steps but not for their sum.
 
-use tandem_sdk::{AxisLimits, AxisVector};
+use tandem_sdk::{Axes, AxisLimits, AxisVector};
 
 use crate::geometry::Entry;
 use crate::options::Junction;
@@ -28,15 +28,17 @@ const CONSTANT_SHARE: f64 = 0.5;
 pub struct Rule {
     kind: Junction,
     axes: Vec<AxisLimits>,
+    names: Axes,
     fine_period_s: f64,
 }
 
 impl Rule {
-    /// The rule `kind` for the given axes. The fine period enters the tangent feed only.
-    pub fn new(kind: Junction, axes: &[AxisLimits], fine_period_s: f64) -> Self {
+    /// The rule `kind` for the axes of `names` with these limits. The fine period enters the tangent feed only.
+    pub fn new(kind: Junction, names: &Axes, axes: &[AxisLimits], fine_period_s: f64) -> Self {
         Self {
             kind,
             axes: axes.to_vec(),
+            names: *names,
             fine_period_s,
         }
     }
@@ -124,9 +126,13 @@ impl Rule {
                 k: bend[axis],
                 a: MARGIN * limits.acceleration_mm_per_s2,
             };
-            let (row, cap) = costs.row(straight, entry.half_step[axis], end.half_step[axis]);
-            if let Some(square) = cap {
-                turning.and(square);
+            let half_steps = [entry.half_step[axis], end.half_step[axis]];
+            let mut row = costs.row(straight, half_steps);
+            if self.names.is_rotary(axis)
+                && let Some((slowed, cap)) = costs.slowed_row(straight, half_steps, &row)
+            {
+                row = slowed;
+                turning.and(cap);
             }
             if row.limits() {
                 entry.rows.push(row);
@@ -174,23 +180,17 @@ impl Costs {
         }
     }
 
-    /// The row of one axis with the cost of the half steps `before` and `after`, in the form that allows more speed, and the square of the
-    /// speed up to which it holds, as a ratio; without one it holds up to the feed.
+    /// The row of one axis with the cost of the half steps at its start and at its end, in the form that allows more speed.
     /// The rate that takes the steps back is at most `v_peak·(v_s|Δu_s| + v_e|Δu_e|)/(2L)`. Where the junctions are
     /// slow and the block long, that is a small constant. In a chain of chords, where the junction feeds are the feed
     /// itself, it goes with the square of the speed: `w·|Δu_s + Δu_e|/(2L)`, and what is left where the end speeds
-    /// differ goes with the path acceleration. Where the feed is too high for the first form and the second leaves next to no path
-    /// acceleration (a rotary axis stops, and a linear one whose way is counted in mm goes on), the block is driven at the speed up to
-    /// which the constant is small.
-    fn row(&self, row: Row, before: f64, after: f64) -> (Row, Option<(f64, f64)>) {
+    /// differ goes with the path acceleration.
+    fn row(&self, row: Row, [before, after]: [f64; 2]) -> Row {
         if before == 0.0 && after == 0.0 {
-            return (row, None);
+            return row;
         }
-        let [start, end] = self.ends_mm_per_s;
-        let per_speed = (start * before.abs() + end * after.abs()) * self.per_mm;
-        let taken = self.feed_mm_per_s * per_speed;
         let constant = Row {
-            a: row.a - taken,
+            a: row.a - self.feed_mm_per_s * self.stepped([before, after]) * self.per_mm,
             ..row
         };
         let square = Row {
@@ -199,25 +199,35 @@ impl Costs {
             a: row.a,
         };
         let affordable = constant.a >= (1.0 - CONSTANT_SHARE) * row.a;
-        if affordable {
-            if self.reaches_as_far(&constant, &square) {
-                return (constant, None);
-            }
-            return (square, None);
+        if affordable && self.reaches_as_far(&constant, &square) {
+            constant
+        } else {
+            square
         }
+    }
+
+    /// By how much the velocity steps at both ends, in the mean.
+    fn stepped(&self, [before, after]: [f64; 2]) -> f64 {
+        let [start, end] = self.ends_mm_per_s;
+        start * before.abs() + end * after.abs()
+    }
+
+    /// The constant form at the speed up to which it takes its share, and the square of that speed as a ratio; none where that allows no more
+    /// speed than `other`. The way of a line that moves a linear axis is in mm and that of a turn alone in rad. Where one follows the
+    /// other, the direction of the rotary axis steps by nearly 1: with a feed in mm/s the constant is more than the axis has, and the
+    /// square leaves as little path acceleration, in mm/s², as the axis has in rad/s².
+    fn slowed_row(&self, row: Row, half_steps: [f64; 2], other: &Row) -> Option<(Row, (f64, f64))> {
+        let per_speed = self.stepped(half_steps) * self.per_mm;
         let afforded = CONSTANT_SHARE * row.a;
         let slowed = Row {
             a: row.a - afforded,
             ..row
         };
         let cap = (afforded * afforded, per_speed * per_speed);
-        let of_square = self.reach(&square);
-        let cap_is_higher = cap.0 * of_square.1 > of_square.0 * cap.1;
-        if cap_is_higher && self.reaches_as_far(&slowed, &square) {
-            (slowed, Some(cap))
-        } else {
-            (square, None)
-        }
+        let of_other = self.reach(other);
+        let is_higher = cap.0 * of_other.1 > of_other.0 * cap.1;
+        let takes_more = self.feed_mm_per_s * per_speed > afforded;
+        (takes_more && is_higher && self.reaches_as_far(&slowed, other)).then_some((slowed, cap))
     }
 
     /// Square of the speed that a row lets the block come to from its slower junction, as a ratio.

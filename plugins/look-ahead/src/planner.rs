@@ -56,7 +56,7 @@ impl LookAhead {
         Ok(Self {
             context: *context,
             max_blocks_per_s: BLOCKS_PER_FINE_PERIOD / context.fine_period_s,
-            rule: Rule::new(options.junction, axes, context.fine_period_s),
+            rule: Rule::new(options.junction, &context.axes, axes, context.fine_period_s),
             feed_axis_mm_per_s: axes.iter().map(|a| a.feed_mm_per_s).collect(),
             rapid_axis_mm_per_s: axes.iter().map(|a| a.rapid_mm_per_s).collect(),
             buffer: Buffer::new(options.buffer_blocks),
