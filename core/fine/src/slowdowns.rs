@@ -278,18 +278,24 @@ mod tests {
     use rtrb::RingBuffer;
     use tandem_sdk::AxisVector;
 
+    /// A segment of 1 s with a feed that ends at rest or goes on.
+    fn fed(feed_mm_per_s: f64, rests: bool) -> Segment {
+        let mut segment = Segment::rest(&AxisVector::ZERO, 1.0);
+        segment.flags = if rests {
+            SegmentFlags::ENDS_AT_REST
+        } else {
+            SegmentFlags::default()
+        };
+        segment.feed_mm_per_s = feed_mm_per_s;
+        segment
+    }
+
     /// The marks ahead of a place at rest behind which feeds follow; `true` where the segment ends at rest.
     fn marks(feeds: &[(f64, bool)]) -> Vec<(f64, f64)> {
         let (mut input, output) = RingBuffer::new(16);
         let mut path_mm = 0.0;
         for (feed_mm_per_s, rests) in feeds {
-            let mut segment = Segment::rest(&AxisVector::ZERO, 1.0);
-            segment.flags = if *rests {
-                SegmentFlags::ENDS_AT_REST
-            } else {
-                SegmentFlags::default()
-            };
-            segment.feed_mm_per_s = *feed_mm_per_s;
+            let mut segment = fed(*feed_mm_per_s, *rests);
             segment.path = [path_mm, *feed_mm_per_s, 0.0, 0.0, 0.0, 0.0];
             path_mm += feed_mm_per_s;
             let start_s = 0.0;
@@ -345,13 +351,7 @@ mod tests {
     fn to_meet(segments: &[(f64, f64, bool)], here_mm: f64) -> Vec<(f64, f64)> {
         let mut slowdowns = Slowdowns::new();
         for (number, (feed_mm_per_s, leaves_mm_per_s2, rests)) in segments.iter().enumerate() {
-            let mut segment = Segment::rest(&AxisVector::ZERO, 1.0);
-            segment.flags = if *rests {
-                SegmentFlags::ENDS_AT_REST
-            } else {
-                SegmentFlags::default()
-            };
-            segment.feed_mm_per_s = *feed_mm_per_s;
+            let mut segment = fed(*feed_mm_per_s, *rests);
             segment.stop_deceleration_mm_per_s2 = *leaves_mm_per_s2;
             segment.path[0] = number as f64;
             segment.path[1] = 1.0;

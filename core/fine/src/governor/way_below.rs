@@ -370,6 +370,16 @@ mod tests {
     use proptest::prelude::*;
     use tandem_sdk::{AxisLimits, AxisVector, MAX_AXES, Segment, derivatives};
 
+    /// A constant rate at the present place of a plan.
+    fn at_rate<'a>(sigma: f64, ahead: &'a Ahead<'a>) -> RateState<'a> {
+        RateState {
+            sigma,
+            rate_per_s: 0.0,
+            place: ahead.place(TWO_LINEAR),
+            recent: Recent::default(),
+        }
+    }
+
     /// A way begins with single periods, and the farther it is, the more of them it takes in a step: no step is a large share of it.
     #[test]
     fn the_steps_of_a_way_grow_with_it() {
@@ -455,12 +465,7 @@ mod tests {
         segment.path = segment.coefficients[0];
         segment.feed_mm_per_s = 10.0;
         let ahead = Ahead::new(&segment, Some(0.0), 0, None);
-        let here = RateState {
-            sigma: 0.5,
-            rate_per_s: 0.0,
-            place: ahead.place(TWO_LINEAR),
-            recent: Recent::default(),
-        };
+        let here = at_rate(0.5, &ahead);
         // At 5 mm/s, where 4 are asked for, the plan gets faster by 5 % in ten periods.
         for (rate_per_s, is_kept) in [(0.0, false), (-3.0, true)] {
             let mut watch = Watch::new(&here, 0.4);
@@ -484,12 +489,7 @@ mod tests {
         segment.path[1] -= 1e-17;
         segment.feed_mm_per_s = 1.0;
         let ahead = Ahead::new(&segment, Some(0.0), 0, None);
-        let here = RateState {
-            sigma: 1.0,
-            rate_per_s: 0.0,
-            place: ahead.place(TWO_LINEAR),
-            recent: Recent::default(),
-        };
+        let here = at_rate(1.0, &ahead);
         let aim = Aim {
             goal: Goal::run(1.0, 1.0, None),
             ratio: 1.0,
@@ -521,12 +521,7 @@ mod tests {
             segment.path = segment.coefficients[0];
             segment.feed_mm_per_s = 1.0;
             let ahead = Ahead::new(&segment, Some(0.0), 0, None);
-            let here = RateState {
-                sigma: 0.5,
-                rate_per_s: 0.0,
-                place: ahead.place(TWO_LINEAR),
-                recent: Recent::default(),
-            };
+            let here = at_rate(0.5, &ahead);
             let aim = Aim {
                 goal: Goal::run(1.0, 5.0, None),
                 ratio: 5.0,
@@ -551,12 +546,7 @@ mod tests {
             let horizon = Horizon::new(&limits, 2, period_s);
             let mut ways = WaySearch::new(period_s);
             let ahead = Ahead::new(&segment, Some(0.0), 0, None);
-            let here = RateState {
-                sigma: 1.0,
-                rate_per_s: 0.0,
-                place: ahead.place(TWO_LINEAR),
-                recent: Recent::default(),
-            };
+            let here = at_rate(1.0, &ahead);
             let aim = Aim {
                 goal: Goal::run(1.0, 10.0, None),
                 ratio: 1.0,
