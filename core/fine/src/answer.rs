@@ -260,11 +260,11 @@ mod tests {
             (old_inputs(&feedback), ages(&feedback, 2)),
             (0, [3, 3, 0, 0, 0, 0, 0, 0])
         );
-        (
-            feedback.input_age_periods[0],
-            feedback.input_age_periods[63],
-        ) = (1, u16::MAX);
-        assert_eq!(old_inputs(&feedback), 1 | 1 << 63);
+        for age in [1, u16::MAX] {
+            feedback.input_age_periods[0] = age;
+            feedback.input_age_periods[63] = age;
+            assert_eq!(old_inputs(&feedback), 1 | 1 << 63);
+        }
     }
 
     #[test]

@@ -262,18 +262,24 @@ mod tests {
         assert!(horizon.is_steady());
         horizon.fill(&cursor.ahead(), 0.001);
         assert!(!horizon.is_steady(), "the second segment gets faster");
-        let mut risen = 0;
-        for point in horizon.iter() {
-            let expected = 10.0 + 10.0 * (point.offset_s - 0.03).max(0.0);
-            let velocity = point.motion.velocity[0];
-            assert!(
-                (velocity - expected).abs() < 1e-6,
-                "{velocity} at {}",
-                point.offset_s
-            );
-            risen += u32::from(velocity > 10.1);
-        }
-        assert!(risen > 3, "{risen}");
+        let risen = |horizon: &Horizon, from_s: f64| {
+            let mut risen = 0;
+            for point in horizon.iter() {
+                let expected = 10.0 + 10.0 * (from_s + point.offset_s - 0.03).max(0.0);
+                let velocity = point.motion.velocity[0];
+                assert!(
+                    (velocity - expected).abs() < 1e-6,
+                    "{velocity} at {}",
+                    point.offset_s
+                );
+                risen += usize::from(velocity > 10.1);
+            }
+            risen
+        };
+        assert!(risen(&horizon, 0.0) > 3);
+        cursor.advance(0.05, |_| false);
+        horizon.fill(&cursor.ahead(), 0.001);
+        assert_eq!(risen(&horizon, 0.05), horizon.iter().count());
     }
 
     /// A period takes its points where there is room beside the grid, however many segments it passes.

@@ -171,25 +171,45 @@ mod tests {
     use tandem_rings::Queued;
     use tandem_sdk::{AxisVector, SegmentFlags};
 
-    /// As many segments as are looked at, of 0.1 ms each, have room for all of their points.
-    #[test]
-    fn a_horizon_of_short_segments_is_covered() {
-        let (mut input, output) = RingBuffer::new(LOOK_ENTRIES + 2);
-        for index in 0..LOOK_ENTRIES {
+    /// At the beginning of so many segments of 0.1 ms each, with a jerk of `jerk`, each faster by 1 mm/s.
+    fn at_short_segments(count: usize, jerk: f64) -> Cursor {
+        let (mut input, output) = RingBuffer::new(count);
+        for index in 0..count {
             let mut segment = Segment::rest(&AxisVector::ZERO, 1e-4);
             segment.flags = SegmentFlags::default();
             segment.coefficients[0][1] = 1.0 + index as f64;
+            segment.coefficients[0][3] = jerk / 6.0;
             let start_s = 0.0;
             input.push(Queued::Segment { start_s, segment }).unwrap();
         }
         let mut cursor = Cursor::new(output, &AxisVector::ZERO);
         cursor.advance(1e-9, |_| false);
+        cursor
+    }
+
+    /// As many segments as are looked at have room for all of their points.
+    #[test]
+    fn a_horizon_of_short_segments_is_covered() {
+        let mut cursor = at_short_segments(LOOK_ENTRIES, 0.0);
         let mut points = PeriodPoints::new(&[AxisLimits::unlimited(); MAX_AXES], 1);
         let horizon_s = 1e-4 * (LOOK_ENTRIES as f64 - 1.5);
         points.fill(&cursor.ahead(), horizon_s);
         assert_eq!(points.covered_s, horizon_s);
         let fastest = points.iter().map(|point| point.velocity[0]);
         assert_eq!(fastest.fold(0.0, f64::max), LOOK_ENTRIES as f64 - 1.0);
+    }
+
+    /// Of curved segments, each with a point in its middle, as many have room, and what lies behind them is not looked at.
+    #[test]
+    fn no_more_curved_segments_are_looked_at_than_have_room() {
+        let mut cursor = at_short_segments(LOOK_ENTRIES + 2, 1.0);
+        let mut points = PeriodPoints::new(&[AxisLimits::unlimited(); MAX_AXES], 1);
+        for (segments, is_covered) in [(LOOK_ENTRIES, true), (LOOK_ENTRIES + 1, false)] {
+            let horizon_s = 1e-4 * (segments as f64 - 0.5);
+            points.fill(&cursor.ahead(), horizon_s);
+            assert_eq!(points.iter().count(), 3 * LOOK_ENTRIES);
+            assert_eq!(points.covered_s == horizon_s, is_covered, "{segments}");
+        }
     }
 
     /// Where no time passes inside the plan the place itself is looked at; at a rest of the plan nothing is.

@@ -343,6 +343,30 @@ mod tests {
         assert_eq!(governor.rate_in_time(0.01), 1.0);
     }
 
+    /// The slope of a piece is what the limits leave in the periods of its rate alone: it is not taken from far behind, where X is faster.
+    #[test]
+    fn the_rate_that_is_given_is_little_lower_than_it_must_be() {
+        let (most, used) = (100.0, 0.9);
+        let segment = turning(most, used, 0.9, 4.0);
+        let (feed, time_s) = (segment.feed_mm_per_s, segment.duration_s);
+        let mut governor = Governor::new(&limits([most, 1e6]), 2, 0.02 * time_s);
+        governor.look_ahead(
+            PlanAhead::new(&segment, [&[], &[]], TWO_LINEAR).begin(0.0),
+            1.0,
+        );
+        let step_s = time_s / 2000.0;
+        let (mut w, mut least) = (MOST, f64::INFINITY);
+        for step in (0..2000).rev() {
+            let t = f64::from(step) * step_s;
+            let speed = feed - most * used * t;
+            w += step_s * (most - 2.0 * w * most * used).max(0.0) / speed;
+            w = w.min((feed / segment.path_speed_mm_per_s(t)).powi(2) / 2.0);
+            let found = governor.rate_in_time(t).powi(2) / 2.0;
+            least = least.min(found / w);
+        }
+        assert!(least > 0.95, "{least} of what can be kept");
+    }
+
     proptest! {
         /// X slows down with nearly all that it has while Y gets fast: from the rate that is given, lowering it with what the
         /// limits leave keeps the feed at every place.

@@ -446,6 +446,66 @@ mod tests {
         }
     }
 
+    /// What samples show of a step takes its part of the acceleration, and the change of the rate has the rest.
+    #[test]
+    fn a_step_leaves_less_of_the_acceleration() {
+        let mut line = Segment::rest(&AxisVector::ZERO, 1.0);
+        line.coefficients[0][1] = 5.0;
+        line.flags = SegmentFlags::default();
+        let mut limits = limits();
+        limits[0].jerk_mm_per_s3 = 1e9;
+        let horizon = Horizon::new(&limits, 2, PERIOD_S);
+        let ways = WaySearch::new(PERIOD_S);
+        let changes = |step_mm_per_s: f64| {
+            let mut faster = line;
+            faster.coefficients[0][1] += step_mm_per_s;
+            faster.flags = SegmentFlags::STEPS;
+            let mut recent = Recent::default();
+            recent.pass(Some(&Steps::between(&line, &faster)));
+            let way = RateState {
+                sigma: 0.5,
+                rate_per_s: 0.0,
+                place: PlanAhead::new(&line, [&[], &[]], TWO_LINEAR).begin(0.0),
+                recent,
+            };
+            let range = ways.range(&way, PERIOD_S, &horizon).unwrap();
+            [range.low, range.high]
+        };
+        let left = ACCELERATION_SHARE * ACCELERATION - 0.5 * 0.4 / PERIOD_S;
+        let share = left / (ACCELERATION_SHARE * ACCELERATION);
+        for (with, without) in changes(0.4).into_iter().zip(changes(0.0)) {
+            assert!(
+                (with / without / share - 1.0).abs() < 0.01,
+                "{with} of {without}"
+            );
+        }
+    }
+
+    /// A rate that is turned round before the end of its range only with nearly all of the jerk is turned round, whatever is wanted.
+    #[test]
+    fn a_way_is_found_where_only_one_near_the_limits_is_left() {
+        const SPEED: f64 = 20.0;
+        let mut line = Segment::rest(&AxisVector::ZERO, 1.0);
+        line.coefficients[0][1] = SPEED;
+        line.flags = SegmentFlags::default();
+        let horizon = Horizon::new(&limits(), 2, PERIOD_S);
+        for (rate_per_s, end) in [(10.0_f64, 1.0), (-10.0, 0.0)] {
+            let shortest = rate_per_s * rate_per_s.abs() / (2.0 * JERK / SPEED);
+            let here = RateState {
+                sigma: end - 1.2 * shortest,
+                rate_per_s,
+                place: PlanAhead::new(&line, [&[], &[]], TWO_LINEAR).begin(0.1),
+                recent: Recent::default(),
+            };
+            let mut ways = WaySearch::new(PERIOD_S);
+            let found = ways.recoverable(1000.0 * rate_per_s, &here, &horizon);
+            assert!(
+                found.is_some_and(|change| change * rate_per_s < 0.0),
+                "{found:?} from {rate_per_s}"
+            );
+        }
+    }
+
     /// What comes next of a way is known before it is driven, to its end.
     #[test]
     fn a_way_says_what_it_does_next() {

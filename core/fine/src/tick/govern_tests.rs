@@ -96,6 +96,30 @@ fn a_rate_from_rest_keeps_the_feed_at_its_end_and_in_its_mean() {
     );
 }
 
+/// The plan has 1 mm/s at the end of its first period, by constant acceleration or by constant jerk: the rate from rest is as high as keeps
+/// the feed there.
+#[test]
+fn a_rate_from_rest_is_as_high_as_keeps_the_feed() {
+    let second = 1.0 / (2.0 * PERIOD_S);
+    let third = 1.0 / (3.0 * PERIOD_S * PERIOD_S);
+    for (path, power) in [
+        ([0.0, 0.0, second, 0.0, 0.0, 0.0], 2),
+        ([0.0, 0.0, 0.0, third, 0.0, 0.0], 3),
+    ] {
+        for feed in [0.01, 0.1, 0.5] {
+            let mut follower = follower(2, &[segment(path, feed, 1.0)]);
+            let sigma = follower.ratio_from_rest(&AT_THE_FEED, f64::INFINITY);
+            let share = sigma.powi(power) / feed;
+            // What its logarithm is off by is halved in each round.
+            let least = feed.powf(2.0 * 0.5f64.powf(REST_ROUNDS.into()));
+            assert!(
+                share > 0.999 * least && share < 1.0 + 1e-9,
+                "{share} of {feed}"
+            );
+        }
+    }
+}
+
 /// Under constant acceleration the speed after some periods grows with the rate too: at the geometric mean of two rates it is kept.
 #[test]
 fn a_rate_to_begin_with_is_as_high_as_keeps_the_feed_for_some_periods() {
@@ -227,6 +251,36 @@ fn braking_for_a_place_ahead_waits_until_it_has_to_begin() {
             end
         );
     }
+}
+
+/// With a jerk limit the speed that is there a period later decides how soon that is; what gets slower is as fast as now.
+#[test]
+fn braking_for_a_place_ahead_counts_on_what_the_speed_gains_in_a_period() {
+    let mut follower = follower(3, &[segment([0.0, 20.0, 0.0, 0.0, 0.0, 0.0], 20.0, 1.0)]);
+    follower.cursor.advance(0.1, |_| false);
+    follower.request = request(Ask::Run);
+    follower.horizon.fill(&follower.cursor.ahead(), PERIOD_S);
+    for (acceleration, speed_a_period_later) in [(500.0, 20.5), (-500.0, 20.0)] {
+        let along = Along {
+            acceleration_mm_per_s2: acceleration,
+            ..follower.along()
+        };
+        let soon_mm = BRAKING_PERIODS * PERIOD_S * speed_a_period_later;
+        let begins_mm = follower.cursor.path_mm() + along.way_to_mm(0.0) + soon_mm;
+        let towards = |off_mm: f64| follower.speed_towards(&along, begins_mm + off_mm, 0.0);
+        assert_eq!([-1e-6, 1e-6].map(towards), [0.0, f64::INFINITY]);
+    }
+}
+
+/// Less is asked for than the whole rate where a lower feed ahead is met: its share of what is planned here.
+#[test]
+fn a_lower_feed_ahead_asks_for_its_share_of_the_speed() {
+    let at_its_feed = |speed: f64| segment([0.0, speed, 0.0, 0.0, 0.0, 0.0], speed, 1.0);
+    let mut follower = follower(2, &[at_its_feed(20.0), at_its_feed(10.0)]);
+    follower.cursor.advance(0.99, |_| false);
+    follower.request = request(Ask::Run);
+    follower.speed_for_places(&AT_THE_FEED, None);
+    assert_eq!(follower.chosen.least_asked, 0.5);
 }
 
 /// The plan is twice as fast as the feed: the rate is to be low there where a lower one than planned is asked for, and only there.

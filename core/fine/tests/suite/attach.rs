@@ -406,6 +406,31 @@ fn exchanges_go_on_until_every_brake_is_closed_and_no_longer() {
     }
 }
 
+/// Two axes move until input 9 rises.
+fn queue_move_to_edge(bench: &mut Bench) {
+    let both = |amount: f64| AxisVector::from_slice(&[amount, amount]);
+    let stop_on = StopOn {
+        input: 9,
+        edge: Edge::Rising,
+        miss_is_fault: 0,
+    };
+    bench.piece([AxisVector::ZERO, both(250.0)], 0.1, false, stop_on);
+    bench.piece([both(50.0), AxisVector::ZERO], 1.0, false, stop_on);
+    bench.piece([both(50.0), both(-250.0)], 0.1, true, stop_on);
+}
+
+#[test]
+fn a_motion_whose_edge_is_there_before_it_says_so_and_goes_next_to_nowhere() {
+    let mut bench = three(Script::new(JOINTS), 500);
+    let from = attach(&mut bench, 10).unwrap();
+    bench.script().inputs = 1 << 9;
+    queue_move_to_edge(&mut bench);
+    let rest = bench.rest(50).expect("it comes to rest");
+    assert_eq!((rest.cause, rest.latch), (RestCause::Already, None));
+    let way_mm = rest.position[0] - from[0];
+    assert!((0.0..0.01).contains(&way_mm), "{way_mm}");
+}
+
 #[test]
 fn an_edge_is_armed_before_the_motion_and_a_joint_that_did_not_catch_it_is_found_between_its_samples()
  {
@@ -418,15 +443,7 @@ fn an_edge_is_armed_before_the_motion_and_a_joint_that_did_not_catch_it_is_found
         };
         let mut bench = three(script, 500);
         attach(&mut bench, 10).unwrap();
-        let both = |amount: f64| AxisVector::from_slice(&[amount, amount]);
-        let stop_on = StopOn {
-            input: 9,
-            edge: Edge::Rising,
-            miss_is_fault: 0,
-        };
-        bench.piece([AxisVector::ZERO, both(250.0)], 0.1, false, stop_on);
-        bench.piece([both(50.0), AxisVector::ZERO], 1.0, false, stop_on);
-        bench.piece([both(50.0), both(-250.0)], 0.1, true, stop_on);
+        queue_move_to_edge(&mut bench);
         bench.ticks(20 + random.below(900));
         let before = bench.script().position;
         bench.script().inputs = 1 << 9;

@@ -112,6 +112,19 @@ fn a_joint_is_adopted_where_its_drive_says_that_it_is() {
     }
 }
 
+/// Where it is, nobody but its drive knows.
+#[test]
+fn a_joint_in_the_hands_of_its_drive_is_in_no_sample() {
+    let mut bench = unhomed(&mut Random::new(13));
+    bench.script().never_homes = true;
+    hand_over(&mut bench, 10.0);
+    bench.ticks(20);
+    while bench.host.samples.pop().is_ok() {}
+    bench.ticks(20);
+    assert_ne!(bench.told().homing, 0);
+    assert!(bench.host.samples.pop().is_err());
+}
+
 #[test]
 fn it_is_followed_again_from_there() {
     let mut bench = unhomed(&mut Random::new(9));
