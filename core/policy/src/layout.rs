@@ -418,6 +418,26 @@ mod tests {
         }
     }
 
+    /// Table of 32 inputs at the start of the memory: its last byte counts.
+    #[test]
+    fn a_table_of_inputs_lies_inside_the_memory_as_a_whole() {
+        let at = |field: usize| {
+            Ok(match field {
+                abi::layout::INPUT_COUNT => MAX_INPUTS,
+                abi::layout::INPUT_BYTES => abi::input::BYTES as u32,
+                _ => 0,
+            })
+        };
+        let whole = abi::input::BYTES * MAX_INPUTS as usize;
+        for (bytes, is_inside) in [(whole - 1, false), (whole, true)] {
+            let why = inputs(&vec![0; bytes], &at)
+                .err()
+                .map(|why| why.to_string());
+            let is_outside = why.is_some_and(|why| why.contains("the table of inputs"));
+            assert_eq!(is_outside, !is_inside, "{bytes} bytes");
+        }
+    }
+
     /// What is said of a table of so many parameters of so many bytes at the start of a memory of this size.
     fn refused(count: u32, bytes: u32, memory: usize) -> String {
         let at = |field: usize| {

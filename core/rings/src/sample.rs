@@ -158,6 +158,7 @@ pub struct Sample {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::collections::HashSet;
 
     #[test]
     fn a_state_is_found_by_its_number_and_a_number_that_is_none_is_standstill() {
@@ -165,5 +166,29 @@ mod tests {
             assert_eq!(MachineState::from_number(number) as u32, number);
         }
         assert_eq!(MachineState::from_number(7), MachineState::Standstill);
+    }
+
+    /// By its name alone people and programs know which it is.
+    #[test]
+    fn every_state_and_every_cause_of_a_stop_has_a_name_of_its_own() {
+        let states: HashSet<_> = (0..7)
+            .map(|n| MachineState::from_number(n).name())
+            .collect();
+        assert_eq!(states.len(), 7);
+        let causes = [
+            StopCause::None,
+            StopCause::Hold,
+            StopCause::Door,
+            StopCause::HoldInput,
+            StopCause::Spindle,
+            StopCause::ProgramStop,
+            StopCause::Starvation,
+            StopCause::Edge,
+            StopCause::Abort,
+            StopCause::SoftFault,
+            StopCause::Fault,
+        ];
+        let names: HashSet<_> = causes.iter().map(|cause| cause.name()).collect();
+        assert_eq!(names.len(), causes.len());
     }
 }

@@ -70,6 +70,7 @@ impl Switched {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::collections::HashSet;
 
     #[test]
     fn coolant_and_outputs_of_the_user_share_the_bits() {
@@ -83,5 +84,19 @@ mod tests {
         let all = on(&[0, 5, MIST, FLOOD]);
         assert!(all.is_on(5) && all.is_on(MIST) && !all.is_on(1));
         assert_eq!(all.user_outputs(), 0b10_0001);
+    }
+
+    /// By its name alone people and programs know which it is.
+    #[test]
+    fn whatever_switches_has_a_name_of_its_own() {
+        let all = [
+            SwitchedBy::Program,
+            SwitchedBy::Door,
+            SwitchedBy::Abort,
+            SwitchedBy::Fault,
+            SwitchedBy::EmergencyStop,
+        ];
+        let names: HashSet<_> = all.iter().map(|by| by.name()).collect();
+        assert_eq!(names.len(), all.len());
     }
 }

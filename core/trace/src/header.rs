@@ -245,6 +245,19 @@ mod tests {
         assert!(Header::parse(&body, 1).is_err());
     }
 
+    /// What is written is read again, up to the longest.
+    #[test]
+    fn a_header_may_be_as_long_as_the_longest_and_no_longer() {
+        let mut long = header(0.001);
+        long.program = "p".repeat(MAX_BODY_BYTES - long.body().len() + 1);
+        assert_eq!(long.body().len(), MAX_BODY_BYTES);
+        let (bytes, _) = long.to_bytes().unwrap();
+        let (read, ..) = Header::take(&mut Source::new(&bytes[..])).unwrap();
+        assert_eq!(read.program.len(), long.program.len());
+        long.program.push('p');
+        assert!(long.to_bytes().is_err());
+    }
+
     #[test]
     fn a_body_whose_period_is_no_time_is_refused() {
         assert!(Header::parse(&header(0.001).body(), FORMAT).is_ok());
