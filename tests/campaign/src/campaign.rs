@@ -169,7 +169,13 @@ fn one(plan: &Plan, seed: u64, worker: &mut Worker, shared: &Shared, tell: &(dyn
     if !report.is_failure() {
         return;
     }
+    let Report {
+        planner, kind, why, ..
+    } = &report;
+    let failure = format!("seed {seed}: {planner}: {kind}");
     let (smallest, last) = if count <= plan.minimised {
+        // What is slow to run is made smaller for hours, which may not hide that it failed.
+        tell(&format!("{failure}: {why}\n  is made smaller"));
         minimise(
             &mut |case| worker.run(case),
             &case,
@@ -179,16 +185,11 @@ fn one(plan: &Plan, seed: u64, worker: &mut Worker, shared: &Shared, tell: &(dyn
     } else {
         (case.clone(), report.clone())
     };
-    let folder = plan.out.join(format!(
-        "{}-{}-{seed}",
-        report.planner.replace(' ', "-"),
-        report.kind
-    ));
+    let folder = plan
+        .out
+        .join(format!("{}-{kind}-{seed}", planner.replace(' ', "-")));
     let words = write(&folder, seed, plan.planner, &smallest, &last).unwrap_or_else(|e| e);
-    tell(&format!(
-        "seed {seed}: {}: {}: {}\n{words}",
-        report.planner, report.kind, last.why
-    ));
+    tell(&format!("{failure}: {}\n{words}", last.why));
 }
 
 /// Writes a failure; what to tell of it.

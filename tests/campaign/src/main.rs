@@ -28,7 +28,7 @@ struct Arguments {
     /// Runs at the same time
     #[arg(long, default_value_t = 2)]
     jobs: usize,
-    /// Seconds that a run may take
+    /// Seconds of a processor that a run may take
     #[arg(long, default_value_t = 30)]
     patience_s: u64,
     /// Failures of each planner and kind that are made smaller

@@ -7,6 +7,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
 use rustix::process::{Resource, Rlimit, setrlimit};
+use tandem_rig::processor_time_of;
 
 use crate::case::Case;
 use crate::run::{registry, run};
@@ -17,6 +18,8 @@ pub const WORKER: &str = "worker";
 /// Address space of a worker, bytes: a run that asks for more aborts.
 const MAX_BYTES: u64 = 1 << 31;
 
+/// Share of a processor below which a worker does nothing, which is less than the busiest computer leaves to it.
+const MIN_SHARE: f64 = 0.002;
 /// Characters of what a worker said before it died that are told: a backtrace is long.
 const MAX_WORDS: usize = 300;
 
@@ -92,7 +95,7 @@ struct Process {
 }
 
 impl Worker {
-    /// A worker made of `binary`, which works in `folder` and gets at most `patience` for each run.
+    /// A worker made of `binary`, which works in `folder` and gets at most `patience` of a processor for each run.
     pub fn new(binary: &Path, folder: &Path, patience: Duration) -> Self {
         Self {
             binary: binary.to_owned(),
@@ -129,7 +132,7 @@ impl Worker {
             None => Process::start(&self.binary)?,
         };
         writeln!(process.input, "{}", self.folder.display()).map_err(|e| e.to_string())?;
-        match process.lines.recv_timeout(self.patience) {
+        match process.answer(self.patience) {
             Ok(line) => {
                 process.is_used = true;
                 self.process = Some(process);
@@ -185,6 +188,30 @@ impl Process {
             errors: lines_of(errors),
             is_used: false,
         })
+    }
+
+    /// What it answers, as long as it has taken less than `patience` of its processor's time, and takes any: on a computer that
+    /// does other work besides, a run lasts longer and is no worse.
+    fn answer(&self, patience: Duration) -> Result<String, RecvTimeoutError> {
+        let begun = self.processor_time();
+        let mut taken = Duration::ZERO;
+        loop {
+            let wait = patience.saturating_sub(taken).max(patience / 10);
+            match self.lines.recv_timeout(wait) {
+                Err(RecvTimeoutError::Timeout) => {}
+                answer => return answer,
+            }
+            let before = taken;
+            taken = self.processor_time().saturating_sub(begun);
+            if taken >= patience || taken.saturating_sub(before) < wait.mul_f64(MIN_SHARE) {
+                return Err(RecvTimeoutError::Timeout);
+            }
+        }
+    }
+
+    /// What its first thread, which drives the runs, has taken of the processor.
+    fn processor_time(&self) -> Duration {
+        processor_time_of(self.child.id()).unwrap_or_default()
     }
 
     /// Ends it; how it ended, and what it said.

@@ -205,7 +205,8 @@ fn a_worker_that_dies_or_hangs_is_one_failed_run_and_what_it_keeps_of_others_is_
         .kind,
         "memory"
     );
-    assert_eq!(worker("hangs", "exec sleep 600", 1).kind, "hang");
+    assert_eq!(worker("sleeps", "exec sleep 600", 1).kind, "hang");
+    assert_eq!(worker("turns", "while :; do :; done", 1).kind, "hang");
     let answer = |kind: &str, memory_mb: u32| {
         format!("read line; printf 'x\\t{kind}\\t0\\t9\\t{memory_mb}\\t\\n'")
     };

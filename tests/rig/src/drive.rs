@@ -70,13 +70,18 @@ pub fn feed(planner: &mut dyn Planner, blocks: &[impl Offer]) {
 /// # Panics
 /// The system does not tell it.
 pub fn processor_time() -> Duration {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat")
-        .expect("Linux tells the time of a thread");
-    let running = text
-        .split_whitespace()
-        .next()
-        .and_then(|number| number.parse().ok());
-    Duration::from_nanos(running.expect("a number"))
+    time_of("thread-self").expect("Linux tells the time of a thread")
+}
+
+/// The same of the first thread of another process; nothing where that is gone.
+pub fn processor_time_of(process: u32) -> Option<Duration> {
+    time_of(&process.to_string())
+}
+
+fn time_of(thread: &str) -> Option<Duration> {
+    let text = std::fs::read_to_string(format!("/proc/{thread}/schedstat")).ok()?;
+    let running = text.split_whitespace().next()?.parse().ok()?;
+    Some(Duration::from_nanos(running))
 }
 
 /// More calls of `advance` than any program needs.

@@ -17,7 +17,7 @@ pub use bent::Bent;
 pub use blocks::{arc, line, lines, numbered, program};
 pub use cases::{assert_close, canonical_curve, case, curve, numbers, points};
 pub use collected::Collected;
-pub use drive::{Away, Given, Offer, drive, feed, processor_time, stream};
+pub use drive::{Away, Given, Offer, drive, feed, processor_time, processor_time_of, stream};
 pub use echo::Echo;
 pub use files::files;
 pub use machine::{axis, context};
