@@ -38,6 +38,13 @@ pub struct Stretch {
     table: Option<ArcLength>,
     /// Where its knots lie inside: there the third derivative may jump, mm from its start.
     knots_mm: Vec<f64>,
+    /// The shortest way from one of its ends or knots to the next, mm.
+    shortest_mm: f64,
+    /// Directions in which a part of a curve begins and ends: where it stands still in its parameter the derivatives there are
+    /// rounding.
+    directions: Option<[AxisVector; 2]>,
+    /// Whether it stands still in its parameter at its start and at its end.
+    still: [bool; 2],
 }
 
 impl Stretch {
@@ -45,6 +52,16 @@ impl Stretch {
     pub fn next_knot_mm(&self, s_mm: f64) -> f64 {
         let index = self.knots_mm.partition_point(|knot| *knot <= s_mm);
         self.knots_mm.get(index).copied().unwrap_or(f64::INFINITY)
+    }
+
+    /// The shortest way from one of its ends or knots to the next, mm.
+    pub fn shortest_mm(&self) -> f64 {
+        self.shortest_mm
+    }
+
+    /// Directions in which a part of a curve begins and ends, but where it turns back: there it rests.
+    pub fn directions(&self) -> Option<&[AxisVector; 2]> {
+        self.directions.as_ref()
     }
 }
 
@@ -67,6 +84,9 @@ impl Course {
                     turns: false,
                     table: None,
                     knots_mm: Vec::new(),
+                    shortest_mm: path.length_mm(),
+                    directions: None,
+                    still: [false; 2],
                 }];
                 Self {
                     shape: Shape::Path(Box::new(path)),
@@ -82,12 +102,16 @@ impl Course {
             let inside = curve
                 .inner_knots()
                 .filter(|knot| *knot > piece.range.0 && *knot < piece.range.1);
-            let knots_mm = inside.map(|knot| table.length_at(&curve, knot)).collect();
+            let length_mm = table.length().mm;
+            let knots_mm = apart(inside.map(|knot| table.length_at(&curve, knot)), length_mm);
             Stretch {
-                length_mm: table.length().mm,
+                length_mm,
                 turns: *turns,
                 table: Some(table),
+                shortest_mm: shortest_mm(&knots_mm, length_mm),
                 knots_mm,
+                directions: Some([piece.start_direction, piece.end_direction]),
+                still: curve.stands_still_at_ends(piece),
             }
         };
         // Between points of a polygon that coincide there is nothing to drive.
@@ -122,14 +146,19 @@ impl Course {
     /// Position and derivatives by arc length at `s_mm` of stretch `index`. Where a curve stands still in its parameter
     /// (a cusp) direction and curvature are zero. Does not allocate.
     pub fn at(&self, index: usize, s_mm: f64, place: &mut Place) -> AlongPath {
-        match (&self.shape, &self.stretches[index].table) {
+        let stretch = &self.stretches[index];
+        match (&self.shape, &stretch.table) {
             (Shape::Curve(curve), Some(table)) => {
-                table.along_path(curve, s_mm, place).unwrap_or_else(|| {
-                    let position = table.position(curve, s_mm, place);
-                    AlongPath {
-                        position,
-                        ..AlongPath::default()
-                    }
+                let still = stretch.still[0] && s_mm <= 0.0
+                    || stretch.still[1] && s_mm >= stretch.length_mm;
+                let known = if still {
+                    None
+                } else {
+                    table.along_path(curve, s_mm, place)
+                };
+                known.unwrap_or_else(|| AlongPath {
+                    position: table.position(curve, s_mm, place),
+                    ..AlongPath::default()
                 })
             }
             (Shape::Path(path), _) => AlongPath {
@@ -171,6 +200,28 @@ impl Course {
                 .sqrt(),
         }
     }
+}
+
+/// The knots of a stretch between which there is more to drive than rounding, and before its end as well.
+fn apart(knots_mm: impl Iterator<Item = f64>, length_mm: f64) -> Vec<f64> {
+    let mut apart = Vec::new();
+    for knot_mm in knots_mm {
+        let before_mm = apart.last().copied().unwrap_or(0.0);
+        if knot_mm - before_mm > MIN_MM && length_mm - knot_mm > MIN_MM {
+            apart.push(knot_mm);
+        }
+    }
+    apart
+}
+
+/// The shortest way from the start of a stretch, its knots or its end to the next of them, mm.
+fn shortest_mm(knots_mm: &[f64], length_mm: f64) -> f64 {
+    let ends = || knots_mm.iter().copied().chain([length_mm]);
+    std::iter::once(0.0)
+        .chain(ends())
+        .zip(ends())
+        .map(|(from_mm, to_mm)| to_mm - from_mm)
+        .fold(f64::INFINITY, f64::min)
 }
 
 /// The parts of a piece from hairpin to hairpin, and whether they end in one.

@@ -9,6 +9,10 @@ use super::Nurbs;
 const LOOKS: u32 = 32;
 /// Share of the highest of these below which there may be a hairpin: on the way to a cusp the speed falls evenly.
 const SLOW: f64 = 0.3;
+/// Share of it below which it stands still at an end of a span: what rounding leaves.
+const STILL: f64 = 1e-9;
+/// Places between such an end and the first of the even ones, each half as far from it as the one before.
+const NEARER: u32 = 16;
 /// Halvings until the slowest place is known to rounding.
 const HALVINGS: u32 = 60;
 
@@ -44,18 +48,25 @@ impl Nurbs {
                 self.counted_product(&at.first, &at.second),
             )
         };
-        let at = |n: u32| from + (to - from) * (f64::from(n) / f64::from(LOOKS));
-        let fastest = (0..=LOOKS).map(|n| look(at(n)).0).fold(0.0, f64::max);
-        for n in 0..LOOKS {
-            let mut low = at(n);
-            let mut high = at(n + 1);
+        let places = self.looked_at(span, (from, to));
+        let fastest = places.iter().map(|u| look(*u).0).fold(0.0, f64::max);
+        for n in 1..places.len() {
+            let mut low = places[n - 1];
+            let mut high = places[n];
             let ends = [low, high].map(look);
             let falls_and_rises = ends[0].1 < 0.0 && ends[1].1 > 0.0;
             if !falls_and_rises || ends[0].0.min(ends[1].0) > SLOW * fastest {
                 continue;
             }
-            let ways = [low, high].map(|u| self.derivatives_in(span, u).first);
-            if self.counted_product(&ways[0], &ways[1]) >= 0.0 {
+            // Where one of the places is the hairpin nearly itself, only the next one is behind it.
+            let wider = [
+                places[n.saturating_sub(2)],
+                places[(n + 1).min(places.len() - 1)],
+            ];
+            if [[low, high], wider]
+                .iter()
+                .all(|ends| !self.turns_between(span, *ends))
+            {
                 // It slows down and goes on the same way.
                 continue;
             }
@@ -80,5 +91,35 @@ impl Nurbs {
                 found.push(high);
             }
         }
+    }
+
+    /// Places of a part of a span at which its speed is compared: even ones, and where it stands still at an end ever nearer to that,
+    /// but not the end itself. There speed and direction are rounding, and between it and the last of the even places it may turn.
+    fn looked_at(&self, span: usize, (from, to): (f64, f64)) -> Vec<f64> {
+        let way = to - from;
+        let speed = |u: f64| self.counted_length(&self.derivatives_in(span, u).first);
+        let mut places: Vec<f64> = (0..=LOOKS)
+            .map(|n| from + way * (f64::from(n) / f64::from(LOOKS)))
+            .collect();
+        let fastest = places.iter().map(|u| speed(*u)).fold(0.0, f64::max);
+        let nearer = |end: f64, way: f64| {
+            (1..=NEARER).map(move |n| end + way / (f64::from(LOOKS) * f64::from(1u32 << n)))
+        };
+        if speed(to) <= STILL * fastest {
+            places.pop();
+            places.extend(nearer(to, -way));
+        }
+        if speed(from) <= STILL * fastest {
+            places.remove(0);
+            let mut first: Vec<f64> = nearer(from, way).collect();
+            first.reverse();
+            places.splice(0..0, first);
+        }
+        places
+    }
+
+    fn turns_between(&self, span: usize, ends: [f64; 2]) -> bool {
+        let ways = ends.map(|u| self.derivatives_in(span, u).first);
+        self.counted_product(&ways[0], &ways[1]) < 0.0
     }
 }

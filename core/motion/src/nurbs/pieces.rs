@@ -10,6 +10,8 @@ use crate::half_angle_turn_rad;
 pub const CORNER_RAD: f64 = 1e-6;
 /// Share of the mean parameter speed below which the curve stands still in its parameter: a cusp.
 const STANDS_STILL: f64 = 1e-7;
+/// The same share below which that is rounding.
+const ROUNDING: f64 = 1e-12;
 /// Share of the coordinates below which Bezier points coincide.
 const COINCIDES: f64 = 1e-12;
 
@@ -89,6 +91,21 @@ impl Nurbs {
             .windows(2)
             .filter(move |pair| pair[1] > pair[0] && pair[1] > from && pair[1] < to);
         knots.map(|pair| pair[1])
+    }
+
+    /// Whether the curve stands still in its parameter at the start of a piece and at its end: what is left of the derivatives
+    /// there is rounding.
+    pub fn stands_still_at_ends(&self, piece: &Piece) -> [bool; 2] {
+        let (from, to) = piece.range;
+        let mut last = self.span(to);
+        while self.knots[last] >= to {
+            last -= 1;
+        }
+        [(self.span(from), from), (last, to)].map(|(span, u)| {
+            let first = self.derivatives_in(span, u).first;
+            let speed = self.counted_length(&first) * (self.knots[span + 1] - self.knots[span]);
+            speed <= ROUNDING * self.gauss(span, self.knots[span], self.knots[span + 1])
+        })
     }
 
     fn stands_still(&self, knot: f64) -> bool {

@@ -295,6 +295,33 @@ fn hairpins_are_found_by_their_radius() {
     );
 }
 
+/// At the knot between the first two spans the curve stands still, and the first one turns back 4e-9 mm before it: there its speed
+/// falls, rises and falls again between two of the even places at which it is looked at.
+#[test]
+fn a_hairpin_beside_a_standstill_at_a_knot_is_found() {
+    let points = [
+        [45.16, 0.19, 0.0],
+        [43.90, 1.39, 0.0],
+        [43.92, 1.37, 0.0],
+        [43.89, 1.40, 0.0],
+        [45.06, 0.29, 0.0],
+        [42.50, 2.73, 0.0],
+    ];
+    let points = points.map(|point| point.map(|x| 1e-3 * x));
+    let curve = curve(&clamped(3, &points, &[1.0; 6]));
+    let (from, to) = curve.range();
+    let share = |u: &f64| (u - from) / (to - from);
+    let found = curve.hairpins((from, to), 1e-9);
+    assert_eq!(found.len(), 2, "{found:?}");
+    for (u, turn) in found.iter().zip([0.984_018_4, 1.066_583_3]) {
+        assert!((3.0 * share(u) - turn).abs() < 1e-6, "{u} {turn}");
+    }
+    let pieces = curve.pieces();
+    assert_eq!(pieces.len(), 2);
+    assert_eq!(curve.stands_still_at_ends(&pieces[0]), [false, true]);
+    assert_eq!(curve.stands_still_at_ends(&pieces[1]), [true, false]);
+}
+
 #[test]
 fn control_points_on_a_corner_cut_the_curve() {
     let points = [

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use tandem_motion::nurbs::{AlongPath, Place};
 use tandem_sdk::{AxisVector, Block, BlockKind, MAX_AXES, PlannerContext};
 
-use super::route::{BESIDE_MM, SAME_MM};
+use super::route::{BESIDE_MM, SAME_MM, Side};
 use crate::course::Course;
 use crate::limit::chord_feed_mm_per_s;
 
@@ -31,7 +31,7 @@ const WORTH: f64 = 0.05;
 /// Largest turn where stretches join without rest, rad: programs round end points of arcs to 0.001 mm.
 const STRAIGHT: f64 = 1e-3;
 
-/// Share of the length of a leg that is beside its ends at most.
+/// Share of the way to the next end or knot of a leg that is beside one of them at most.
 const BESIDE_SHARE: f64 = 0.05;
 /// Share of that which is rounding.
 const NEAR_SHARE: f64 = 0.01;
@@ -95,9 +95,9 @@ impl Leg {
             .max(rounding)
     }
 
-    /// How far beside its ends and knots derivatives are taken, mm.
+    /// How far beside its ends and knots derivatives are taken, mm: never as far as the next of them, which may be a cusp.
     pub fn beside_mm(&self) -> f64 {
-        BESIDE_MM.min(BESIDE_SHARE * (self.end_mm - self.start_mm))
+        BESIDE_MM.min(BESIDE_SHARE * self.course.stretches()[self.stretch].shortest_mm())
     }
 
     /// What is nearer than that to an end or a knot is there, mm.
@@ -205,20 +205,28 @@ impl Leg {
         cap
     }
 
-    /// The path at its end `s_mm`, or just inside where it stands still in its parameter; `None` where it has no
-    /// direction there either.
-    fn beside(&self, s_mm: f64, inward_mm: f64) -> Option<AlongPath> {
+    /// The path at its start or end, or just inside where it stands still in its parameter; `None` where it has no direction
+    /// there either.
+    fn beside(&self, side: Side) -> Option<AlongPath> {
+        let (s_mm, inward_mm) = match side {
+            Side::Before => (self.end_mm, -self.beside_mm()),
+            Side::Behind => (self.start_mm, self.beside_mm()),
+        };
         let places = [s_mm, s_mm + inward_mm].map(|s| self.at(s, &mut Place::default()));
-        places
+        let at = places
             .into_iter()
-            .find(|at| at.direction != AxisVector::ZERO)
+            .find(|at| at.direction != AxisVector::ZERO)?;
+        let known = self.course.stretches()[self.stretch].directions();
+        let direction = known.map_or(at.direction, |[start, end]| match side {
+            Side::Before => *end,
+            Side::Behind => *start,
+        });
+        Some(AlongPath { direction, ..at })
     }
 
     /// Whether `next` goes on in the same direction, and the steps there leave a speed worth it.
     pub fn runs_into(&self, next: &Self, bounds: &Bounds) -> bool {
-        let ends = self
-            .beside(self.end_mm, -self.beside_mm())
-            .zip(next.beside(next.start_mm, next.beside_mm()));
+        let ends = self.beside(Side::Before).zip(next.beside(Side::Behind));
         let Some((before, after)) = ends else {
             return false;
         };

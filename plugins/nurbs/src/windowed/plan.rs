@@ -192,7 +192,7 @@ fn spot(route: &Route, bounds: &Bounds, at_mm: f64, cursor: &mut Cursor) -> Spot
     let speed_mm_per_s = leg.cap_mm_per_s(&at, bounds).min(step_cap);
     let step_mm = (0.03 / bend)
         .min(route.smooth_for_mm(at_mm, cursor))
-        .clamp(1e-7, 0.05);
+        .clamp(leg.beside_mm(), 0.05);
     // Where a rotary axis turns much on little way, that takes long.
     let max_mm = if leg.course.is_straight() {
         STEP_S * leg.cap_mm_per_s(&at, bounds)

@@ -281,6 +281,41 @@ fn turns_back_are_slow_at_the_turn_only() {
     }
 }
 
+/// Control points that programs round to 10 nm make curves that turn back on next to no radius, and some nanometres beside a knot.
+/// What is looked at beside the knot lies between it and the turn, and where the curve stands still at the knot what is left of its
+/// derivatives there says nothing of its direction.
+#[test]
+fn turns_back_beside_a_knot_are_slow_at_the_turn_only() {
+    let turns_before = [
+        [10.80, 6.30],
+        [7.75, 4.80],
+        [7.96, 4.90],
+        [8.47, 5.15],
+        [9.23, 5.53],
+        [8.71, 5.27],
+        [9.04, 5.43],
+    ];
+    let stands_still = [
+        [45.16, 0.19],
+        [43.90, 1.39],
+        [43.92, 1.37],
+        [43.89, 1.40],
+        [45.06, 0.29],
+        [42.50, 2.73],
+    ];
+    for form in ["scan", "windowed"] {
+        for points in [&turns_before[..], &stands_still[..]] {
+            let curve = |share: f64| {
+                let points: Vec<[f64; 2]> = points.iter().map(|p| p.map(|x| x * share)).collect();
+                even(&points, 3)
+            };
+            let name = format!("a turn beside a knot, {} points", points.len());
+            let time_s = drive_in(form, &name, curve(1e-3)).expect("driven");
+            assert!(time_s < 0.1, "{name}: {time_s} s");
+        }
+    }
+}
+
 /// A rounded square; with arcs that turn a little less, as programs round their ends.
 #[test]
 fn lines_run_into_arcs_without_rest() {
