@@ -240,3 +240,22 @@ pub(crate) fn curve_of(axes: &Axes, curve: Option<Curve<'_>>) -> Result<Nurbs, N
         axes,
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two knots and the end that only rounding tells apart from what is before them are no places of their own, and the shortest
+    /// way is that between the others.
+    #[test]
+    fn knots_that_rounding_tells_apart_are_one() {
+        let knots_mm = apart(
+            [0.5e-9, 1.0, 1.0 + 0.5e-9, 1.25, 2.0 - 0.5e-9].into_iter(),
+            2.0,
+        );
+        assert_eq!(knots_mm, [1.0, 1.25]);
+        assert_eq!(shortest_mm(&knots_mm, 2.0), 0.25);
+        assert_eq!(shortest_mm(&[0.125, 1.0], 2.0), 0.125);
+        assert_eq!(shortest_mm(&[], 2.0), 2.0);
+    }
+}
