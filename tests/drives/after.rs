@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 use tandem_rig::Random;
-use tandem_session::controller::{Controller, NoKeeper, Options, ScriptLine};
+use tandem_session::controller::{Controller, NoPersistence, Options, ScriptLine};
 
 use crate::ethercat::{fault, machine, seeds, table};
 use crate::registry;
@@ -93,7 +93,8 @@ fn told(text: &str, lines: Vec<ScriptLine>) -> Vec<Value> {
     let registry = registry();
     let machine = machine(text);
     let options = Options::of_script(lines);
-    let controller = Controller::open(&machine, &registry, options, Box::new(NoKeeper)).unwrap();
+    let controller =
+        Controller::open(&machine, &registry, options, Box::new(NoPersistence)).unwrap();
     let mut told = vec![];
     controller
         .run(&mut |line| told.extend(serde_json::from_str::<Value>(line).ok()))

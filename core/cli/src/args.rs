@@ -135,6 +135,18 @@ pub struct Session {
     pub trace: Option<PathBuf>,
 }
 
+impl Session {
+    /// The options that concern a process with drives of its own, and whether they are given.
+    pub fn of_own_drives(&self) -> [(bool, &'static str); 4] {
+        [
+            (self.clock != Clock::Wall, "--clock"),
+            (self.trace.is_some(), "--trace"),
+            (self.operator.listen.is_some(), "--listen"),
+            (self.operator.listen_tcp.is_some(), "--listen-tcp"),
+        ]
+    }
+}
+
 #[derive(Group)]
 #[allow(
     clippy::struct_excessive_bools,

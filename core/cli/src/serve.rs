@@ -12,7 +12,7 @@ use rustix::process::Signal;
 use signal_hook::iterator::Signals;
 use tandem_host::moves_metal;
 use tandem_machine::Machine;
-use tandem_session::controller::{Controller, Keeper, NoKeeper, Options, ScriptLine};
+use tandem_session::controller::{Controller, NoPersistence, Options, Persistence, ScriptLine};
 use tandem_session::operator::Listen;
 #[cfg(feature = "web")]
 use tandem_session::operator::Role;
@@ -49,9 +49,9 @@ pub fn serve(options: &args::Serve) -> Result<u8, Box<dyn Error>> {
         .as_ref()
         .map(|store| store.load().to_program(&machine.home));
     let kept_in = store.as_ref().map(|store| store.path().to_owned());
-    let keeper: Box<dyn Keeper> = match store {
+    let persistence: Box<dyn Persistence> = match store {
         Some(store) => Box::new(store),
-        None => Box::new(NoKeeper),
+        None => Box::new(NoPersistence),
     };
     let simulated = !moves_metal(&machine, &registry);
     let asked = Options {
@@ -66,7 +66,7 @@ pub fn serve(options: &args::Serve) -> Result<u8, Box<dyn Error>> {
         lasting,
     };
     let enabled = asked.enable;
-    let controller = Controller::open(&machine, &registry, asked, keeper)?;
+    let controller = Controller::open(&machine, &registry, asked, persistence)?;
     end_by_signals(controller.ender())?;
     #[cfg(feature = "web")]
     let page = crate::web::open(options, &listen)?;

@@ -35,7 +35,7 @@ pub fn open(options: &args::Serve, listen: &Listen) -> Result<Option<Page>, Stri
     let server = Server::start(Options {
         address,
         names: options.http_host.clone(),
-        admits: Arc::new(move |given| tokens.role_of(given).map(entry)),
+        tokens: Arc::new(move |given| tokens.role_of(given).map(entry)),
         controller,
     })?;
     let link = |(token, role)| (format!("http://{}/#token={token}", server.address), role);

@@ -87,7 +87,8 @@ impl LineJudge {
         number: u32,
         text: &str,
     ) -> Result<JudgedLine, Refusal> {
-        let (mut tried, mut items) = (before.clone(), vec![]);
+        let mut tried = before.clone();
+        let mut items = vec![];
         tried.line(number, text.as_bytes(), &mut items)?;
         for item in &items {
             self.check(item)

@@ -10,7 +10,7 @@ pub mod jog;
 mod judge;
 mod mdi;
 pub mod operator;
-mod standing;
+mod standstill;
 
 pub use homing::{HOMING, Homing};
 pub use mdi::{MdiInput, MdiSession, NextLine, Pace};

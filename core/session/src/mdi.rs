@@ -19,7 +19,7 @@ use tandem_rough::Source;
 use tandem_sdk::AxisVector;
 
 use crate::judge::LineJudge;
-use crate::standing::Standing;
+use crate::standstill::Standstill;
 
 /// What the operator says next.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -90,7 +90,7 @@ impl<'a> MdiSession<'a> {
             input,
             failure: None,
             lines: 0,
-            standing: Standing::default(),
+            standing: Standstill::default(),
             busy: false,
         };
         Ok(Self {
@@ -133,7 +133,8 @@ impl<'a> MdiSession<'a> {
 
     /// The machine has come to rest at `position` after a fault, and `left` is on still: the next run goes on from there.
     pub fn stands_at(&mut self, position: AxisVector, left: &Left) {
-        (self.machine.start, self.switched) = (position, left.switched);
+        self.machine.start = position;
+        self.switched = left.switched;
         let mut manual = lock(&self.manual);
         manual.interpreter.set_position(position);
         manual.interpreter.set_switched_off();
@@ -150,7 +151,7 @@ struct Manual {
     /// What is wrong with a line that streams, and ends the run.
     failure: Option<String>,
     lines: u32,
-    standing: Standing,
+    standing: Standstill,
     /// A line is being driven.
     busy: bool,
 }

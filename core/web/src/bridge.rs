@@ -10,7 +10,7 @@ use tokio::io::{AsyncBufReadExt, AsyncWriteExt, BufReader, Lines};
 use tokio::net::UnixStream;
 use tokio::net::unix::{OwnedReadHalf, OwnedWriteHalf};
 
-use crate::judge::Entry;
+use crate::access::Entry;
 
 /// Lines that the page does not hear where something is said in its name: the greeting before it, and its answer.
 const UNHEARD: usize = 2;

@@ -6,10 +6,10 @@
 //! token that only the address printed at the start carries. Requests that change something have no other way in: the server
 //! answers GET alone and reads no body.
 
+mod access;
 mod assets;
 mod bridge;
-mod judge;
 mod server;
 
-pub use judge::{Admits, Entry};
+pub use access::{Entry, TokenCheck};
 pub use server::{Options, Server};

@@ -16,9 +16,9 @@ use axum::routing::get;
 use axum::serve::ListenerExt;
 use tokio::sync::{Semaphore, oneshot};
 
+use crate::access::{AccessCheck, PROTOCOL, TokenCheck};
 use crate::assets;
 use crate::bridge;
-use crate::judge::{Admits, Doorkeeper, PROTOCOL};
 
 /// Pages that are served at a time: the controller has more places than these, so that its other clients find one.
 const MAX_PAGES: usize = 12;
@@ -36,8 +36,8 @@ pub struct Options {
     pub address: SocketAddr,
     /// Names beside the loopback ones by which this computer is asked for, through a proxy of the user's.
     pub names: Vec<String>,
-    /// Says whether a token opens the door.
-    pub admits: Admits,
+    /// Says whether a token is accepted.
+    pub tokens: TokenCheck,
     /// The controller's socket.
     pub controller: PathBuf,
 }
@@ -51,8 +51,8 @@ pub struct Server {
     handle: Option<JoinHandle<()>>,
 }
 
-struct Room {
-    keeper: Doorkeeper,
+struct ServerState {
+    access: AccessCheck,
     controller: PathBuf,
     places: Arc<Semaphore>,
 }
@@ -73,11 +73,11 @@ impl Server {
         }
         let listener = TcpListener::bind(asked).map_err(at)?;
         listener.set_nonblocking(true).map_err(at)?;
-        // What comes through this door has it from the door.
+        // What is accepted here inherits it from the listener.
         let _ = rustix::net::sockopt::set_socket_send_buffer_size(&listener, SEND_BUFFER_BYTES);
         let address = listener.local_addr().map_err(at)?;
-        let room = Arc::new(Room {
-            keeper: Doorkeeper::new(address, &options.names, options.admits),
+        let state = Arc::new(ServerState {
+            access: AccessCheck::new(address, &options.names, options.tokens),
             controller: options.controller,
             places: Arc::new(Semaphore::new(MAX_PAGES)),
         });
@@ -86,7 +86,7 @@ impl Server {
             .build()
             .map_err(at)?;
         let (over, ends) = oneshot::channel();
-        let serve = move || runtime.block_on(serve(listener, room, ends));
+        let serve = move || runtime.block_on(serve(listener, state, ends));
         let handle = thread::Builder::new()
             .name("tandem-web".to_string())
             .stack_size(STACK_BYTES)
@@ -110,7 +110,7 @@ impl Drop for Server {
     }
 }
 
-async fn serve(listener: TcpListener, room: Arc<Room>, ends: oneshot::Receiver<()>) {
+async fn serve(listener: TcpListener, state: Arc<ServerState>, ends: oneshot::Receiver<()>) {
     let Ok(listener) = tokio::net::TcpListener::from_std(listener) else {
         return;
     };
@@ -120,8 +120,8 @@ async fn serve(listener: TcpListener, room: Arc<Room>, ends: oneshot::Receiver<(
         .route("/socket", get(socket))
         .route("/token", get(token))
         .fallback(get(file))
-        .layer(middleware::from_fn_with_state(Arc::clone(&room), judge))
-        .with_state(room);
+        .layer(middleware::from_fn_with_state(Arc::clone(&state), judge))
+        .with_state(state);
     tokio::select! {
         _ = axum::serve(listener, router) => {}
         _ = ends => {}
@@ -129,8 +129,12 @@ async fn serve(listener: TcpListener, room: Arc<Room>, ends: oneshot::Receiver<(
 }
 
 /// Judges every request by its host before anything else looks at it.
-async fn judge(State(room): State<Arc<Room>>, request: Request, next: Next) -> Response<Body> {
-    let mut response = match room.keeper.host(request.uri(), request.headers()) {
+async fn judge(
+    State(state): State<Arc<ServerState>>,
+    request: Request,
+    next: Next,
+) -> Response<Body> {
+    let mut response = match state.access.host(request.uri(), request.headers()) {
         Ok(()) => next.run(request).await,
         Err(why) => assets::plain(StatusCode::FORBIDDEN, why),
     };
@@ -142,33 +146,33 @@ async fn file(uri: Uri, headers: HeaderMap) -> Response<Body> {
     assets::answer(uri.path(), &headers)
 }
 
-/// Whether a token opens the door: a page is not told why its WebSocket was refused, and asks here.
-async fn token(State(room): State<Arc<Room>>, headers: HeaderMap) -> Response<Body> {
+/// Whether a token is accepted: a page is not told why its WebSocket was refused, and asks here.
+async fn token(State(state): State<Arc<ServerState>>, headers: HeaderMap) -> Response<Body> {
     let named = headers
         .get(AUTHORIZATION)
         .and_then(|value| value.to_str().ok());
     let token = named
         .and_then(|named| named.strip_prefix("Bearer "))
         .unwrap_or_default();
-    match room.keeper.token(token) {
+    match state.access.token(token) {
         Ok(_) => assets::plain(StatusCode::OK, "the token opens"),
         Err(why) => assets::plain(StatusCode::FORBIDDEN, why),
     }
 }
 
 async fn socket(
-    State(room): State<Arc<Room>>,
+    State(state): State<Arc<ServerState>>,
     headers: HeaderMap,
     upgrade: Result<WebSocketUpgrade, axum::extract::ws::rejection::WebSocketUpgradeRejection>,
 ) -> Response<Body> {
-    let entry = match room.keeper.socket(&headers) {
+    let entry = match state.access.socket(&headers) {
         Ok(entry) => entry,
         Err(why) => return assets::plain(StatusCode::FORBIDDEN, why),
     };
     let Ok(upgrade) = upgrade else {
         return assets::plain(StatusCode::BAD_REQUEST, "this is the place of a WebSocket");
     };
-    let Ok(place) = Arc::clone(&room.places).try_acquire_owned() else {
+    let Ok(place) = Arc::clone(&state.places).try_acquire_owned() else {
         return assets::plain(
             StatusCode::SERVICE_UNAVAILABLE,
             "as many pages as can be are open already",
@@ -179,7 +183,7 @@ async fn socket(
         .max_message_size(MAX_MESSAGE_BYTES)
         .max_frame_size(MAX_MESSAGE_BYTES)
         .on_upgrade(async move |page| {
-            bridge::carry(page, &room.controller, entry).await;
+            bridge::carry(page, &state.controller, entry).await;
             drop(place);
         })
 }

@@ -20,22 +20,22 @@ const TOKEN: &str = "a token of sixteen";
 const WATCHING: &str = "a token to look with";
 const PATIENCE: Duration = Duration::from_secs(20);
 
-struct House {
+struct TestServer {
     _folder: tempfile::TempDir,
     server: Server,
     /// Everybody who came to the controller.
-    comers: Receiver<UnixStream>,
+    connections: Receiver<UnixStream>,
 }
 
-impl House {
+impl TestServer {
     fn open() -> Self {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("controller");
         let controller = UnixListener::bind(&path).unwrap();
-        let (tell, comers) = channel();
+        let (tell, connections) = channel();
         thread::spawn(move || {
-            for comer in controller.incoming().map_while(Result::ok) {
-                if tell.send(comer).is_err() {
+            for connection in controller.incoming().map_while(Result::ok) {
+                if tell.send(connection).is_err() {
                     return;
                 }
             }
@@ -43,7 +43,7 @@ impl House {
         Self {
             server: start("127.0.0.1:0", &path).unwrap(),
             _folder: folder,
-            comers,
+            connections,
         }
     }
 
@@ -121,7 +121,7 @@ fn start(address: &str, controller: &Path) -> Result<Server, String> {
     Server::start(Options {
         address: address.parse().unwrap(),
         names: vec![],
-        admits: Arc::new(|token| {
+        tokens: Arc::new(|token| {
             let opening = (token == WATCHING).then(|| "{\"less\":true}".to_string());
             [TOKEN, WATCHING]
                 .contains(&token)
@@ -145,8 +145,8 @@ fn offered(token: &str) -> String {
 
 #[test]
 fn strangers_are_refused_and_the_controller_never_hears_of_them() {
-    let house = House::open();
-    let own = house.own();
+    let server = TestServer::open();
+    let own = server.own();
     for (origin, token) in [
         ("http://evil.example", TOKEN),
         ("http://evil.example:8080", TOKEN),
@@ -155,14 +155,14 @@ fn strangers_are_refused_and_the_controller_never_hears_of_them() {
         (own.as_str(), ""),
     ] {
         assert_eq!(
-            house.page(origin, &offered(token)).err(),
+            server.page(origin, &offered(token)).err(),
             Some(403),
             "{origin} {token}"
         );
     }
-    assert_eq!(house.page(&own, "tandem.2").err(), Some(403));
+    assert_eq!(server.page(&own, "tandem.2").err(), Some(403));
     let (host, upgrade) = (
-        house.address(),
+        server.address(),
         "Connection: Upgrade\r\nUpgrade: websocket\r\n\
         Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n",
     );
@@ -172,47 +172,47 @@ fn strangers_are_refused_and_the_controller_never_hears_of_them() {
         "GET /socket HTTP/1.1\r\nHost: evil.example:{0}\r\nOrigin: http://evil.example:{0}\r\n{upgrade}{known}\r\n",
         host.port()
     );
-    assert_eq!(house.ask(&rebound).0, 403);
+    assert_eq!(server.ask(&rebound).0, 403);
     let without = format!("GET /socket HTTP/1.1\r\nHost: {host}\r\n{upgrade}{known}\r\n");
-    assert_eq!(house.ask(&without).0, 403);
+    assert_eq!(server.ask(&without).0, 403);
     for path in ["/", "/main.js", "/token", "/nothing"] {
         let named =
             format!("GET {path} HTTP/1.1\r\nHost: evil.example\r\nConnection: close\r\n\r\n");
-        let (status, answer) = house.ask(&named);
+        let (status, answer) = server.ask(&named);
         assert!(
             status == 403 && !answer.contains("<html"),
             "{path}: {answer}"
         );
     }
     assert!(
-        house.comers.try_recv().is_err(),
+        server.connections.try_recv().is_err(),
         "somebody came to the controller"
     );
     // What was refused above is not refused to everybody.
-    assert!(house.page(&own, &offered(TOKEN)).is_ok());
-    assert!(house.comers.recv_timeout(PATIENCE).is_ok());
+    assert!(server.page(&own, &offered(TOKEN)).is_ok());
+    assert!(server.connections.recv_timeout(PATIENCE).is_ok());
 }
 
 #[test]
 fn the_token_is_asked_by_a_page_that_was_refused() {
-    let house = House::open();
+    let server = TestServer::open();
     let bearer = |token: &str| {
         let header = format!("Authorization: Bearer {}\r\n", digits(token));
-        house.get("/token", &header).0
+        server.get("/token", &header).0
     };
     assert_eq!(
         [bearer(TOKEN), bearer("another"), bearer("")],
         [200, 403, 403]
     );
-    assert_eq!(house.get("/token", "").0, 403);
+    assert_eq!(server.get("/token", "").0, 403);
 }
 
 #[test]
 fn what_is_said_in_a_page_s_name_comes_before_what_the_page_says() {
-    let house = House::open();
-    let mut page = house.page(&house.own(), &offered(WATCHING)).unwrap();
+    let server = TestServer::open();
+    let mut page = server.page(&server.own(), &offered(WATCHING)).unwrap();
     page.send(Message::text("{\"id\":1}")).unwrap();
-    let mut controller = house.comers.recv_timeout(PATIENCE).unwrap();
+    let mut controller = server.connections.recv_timeout(PATIENCE).unwrap();
     controller.set_read_timeout(Some(PATIENCE)).unwrap();
     controller
         .write_all(b"{\"greeting\":1}\n{\"answer\":0}\n{\"greeting\":2}\n")
@@ -225,9 +225,9 @@ fn what_is_said_in_a_page_s_name_comes_before_what_the_page_says() {
 
 #[test]
 fn lines_go_both_ways_as_messages_and_both_ends_close_together() {
-    let house = House::open();
-    let mut page = house.page(&house.own(), &offered(TOKEN)).unwrap();
-    let mut controller = house.comers.recv_timeout(PATIENCE).unwrap();
+    let server = TestServer::open();
+    let mut page = server.page(&server.own(), &offered(TOKEN)).unwrap();
+    let mut controller = server.connections.recv_timeout(PATIENCE).unwrap();
     controller.set_read_timeout(Some(PATIENCE)).unwrap();
     controller
         .write_all(b"{\"tandem\":1}\n{\"event\":\"x\"}\n")
@@ -242,21 +242,21 @@ fn lines_go_both_ways_as_messages_and_both_ends_close_together() {
     drop(page);
     assert_eq!(lines.read_line(&mut line).unwrap(), 0, "the page is gone");
 
-    let mut page = house.page(&house.own(), &offered(TOKEN)).unwrap();
-    drop(house.comers.recv_timeout(PATIENCE).unwrap());
+    let mut page = server.page(&server.own(), &offered(TOKEN)).unwrap();
+    drop(server.connections.recv_timeout(PATIENCE).unwrap());
     assert!(page.read().map_or(true, |message| message.is_close()));
 }
 
 #[test]
 fn a_message_is_one_line_and_none_is_larger_than_a_program() {
-    let house = House::open();
+    let server = TestServer::open();
     for message in [
         Message::text("{\"id\":1}\n{\"id\":2}"),
         Message::binary(vec![0; 4]),
         Message::text("x".repeat((8 << 20) + 1)),
     ] {
-        let mut page = house.page(&house.own(), &offered(TOKEN)).unwrap();
-        let mut controller = house.comers.recv_timeout(PATIENCE).unwrap();
+        let mut page = server.page(&server.own(), &offered(TOKEN)).unwrap();
+        let mut controller = server.connections.recv_timeout(PATIENCE).unwrap();
         controller.set_read_timeout(Some(PATIENCE)).unwrap();
         // The server may close while the rest is on its way.
         let _ = page.send(message);
@@ -269,8 +269,8 @@ fn a_message_is_one_line_and_none_is_larger_than_a_program() {
 /// Nothing that changes anything has a way in but the socket: what is sent along with a request is not read.
 #[test]
 fn bodies_and_paths_of_others_are_refused() {
-    let house = House::open();
-    let host = house.address();
+    let server = TestServer::open();
+    let host = server.address();
     for (method, path, length) in [
         ("POST", "/programs/../x", "1000000000"),
         ("PUT", "/x.ngc", "10"),
@@ -280,7 +280,7 @@ fn bodies_and_paths_of_others_are_refused() {
         let request = format!(
             "{method} {path} HTTP/1.1\r\nHost: {host}\r\nContent-Encoding: gzip\r\nContent-Length: {length}\r\nConnection: close\r\n\r\n"
         );
-        assert_eq!(house.ask(&request).0, 405, "{method} {path}");
+        assert_eq!(server.ask(&request).0, 405, "{method} {path}");
     }
     for path in [
         "/../Cargo.toml",
@@ -289,19 +289,19 @@ fn bodies_and_paths_of_others_are_refused() {
         "//etc/passwd",
         "/vendor/../../src/lib.rs",
     ] {
-        let (status, answer) = house.get(path, "");
+        let (status, answer) = server.get(path, "");
         assert!(
             [400, 404].contains(&status) && !answer.contains("root:"),
             "{path}: {answer}"
         );
     }
-    assert!(house.comers.try_recv().is_err());
+    assert!(server.connections.try_recv().is_err());
 }
 
 #[test]
 fn the_page_may_load_nothing_of_others_and_is_shown_in_no_frame() {
-    let house = House::open();
-    let (status, answer) = house.get("/", "");
+    let server = TestServer::open();
+    let (status, answer) = server.get("/", "");
     assert_eq!(status, 200);
     for words in [
         "frame-ancestors 'none'",
@@ -316,7 +316,7 @@ fn the_page_may_load_nothing_of_others_and_is_shown_in_no_frame() {
         .lines()
         .find_map(|line| line.strip_prefix("etag: "))
         .unwrap();
-    assert_eq!(house.get("/", &format!("If-None-Match: {tag}\r\n")).0, 304);
+    assert_eq!(server.get("/", &format!("If-None-Match: {tag}\r\n")).0, 304);
 }
 
 #[test]
@@ -331,17 +331,17 @@ fn only_this_computer_is_served() {
 /// One page more than there are places is told so, and finds one when another has gone.
 #[test]
 fn there_are_places_for_a_number_of_pages() {
-    let house = House::open();
+    let server = TestServer::open();
     let mut pages: Vec<_> = (0..12)
-        .map(|_| house.page(&house.own(), &offered(TOKEN)).unwrap())
+        .map(|_| server.page(&server.own(), &offered(TOKEN)).unwrap())
         .collect();
-    assert_eq!(house.page(&house.own(), &offered(TOKEN)).err(), Some(503));
+    assert_eq!(server.page(&server.own(), &offered(TOKEN)).err(), Some(503));
     let mut gone = pages.pop().unwrap();
     gone.close(None).unwrap();
     while gone.read().is_ok() {}
     let again = (0..2000).find_map(|_| {
         thread::sleep(Duration::from_millis(10));
-        house.page(&house.own(), &offered(TOKEN)).ok()
+        server.page(&server.own(), &offered(TOKEN)).ok()
     });
     assert!(again.is_some());
 }

@@ -7,7 +7,7 @@ use std::sync::{Arc, LazyLock};
 
 use tandem_host::{Clock, Registry};
 use tandem_machine::Machine;
-use tandem_session::controller::{Controller, NoKeeper, Options, VirtualSender};
+use tandem_session::controller::{Controller, NoPersistence, Options, VirtualSender};
 use tandem_session::operator::Listen;
 
 /// The simulated drives hold by this period.
@@ -113,8 +113,8 @@ pub fn judge(bytes: &[u8]) {
         uptime_periods: 0,
         lasting: None,
     };
-    let mut controller =
-        Controller::open(&MACHINE, &REGISTRY, options, Box::new(NoKeeper)).expect("a controller");
+    let mut controller = Controller::open(&MACHINE, &REGISTRY, options, Box::new(NoPersistence))
+        .expect("a controller");
     let stands = Arc::<AtomicBool>::default();
     controller.add_sender(Box::new(Sender {
         bytes: bytes.to_vec(),

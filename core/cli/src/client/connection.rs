@@ -37,14 +37,14 @@ impl Trouble {
     }
 }
 
-/// Says requests, from any thread.
+/// Sends requests, from any thread.
 #[derive(Clone)]
-pub struct Voice {
+pub struct RequestSender {
     stream: Arc<Mutex<UnixStream>>,
     last_id: Arc<AtomicU64>,
 }
 
-impl Voice {
+impl RequestSender {
     /// Says a request; its answer comes by itself. The answer is its number.
     ///
     /// # Errors
@@ -68,7 +68,7 @@ impl Voice {
 
 /// A connection to a controller.
 pub struct Connection {
-    pub voice: Voice,
+    pub requests: RequestSender,
     told: Receiver<Result<Value, String>>,
     /// What came while an answer was waited for.
     early: Vec<Value>,
@@ -93,7 +93,7 @@ impl Connection {
         let stream = UnixStream::connect(&path).map_err(|e| wrong(e.to_string()))?;
         let reader = stream.try_clone().map_err(|e| wrong(e.to_string()))?;
         let this = Self {
-            voice: Voice {
+            requests: RequestSender {
                 stream: Arc::new(Mutex::new(stream)),
                 last_id: Arc::default(),
             },
@@ -136,7 +136,7 @@ impl Connection {
     /// # Errors
     /// The controller refuses, or is gone.
     pub fn ask(&mut self, request: &str, with: Value) -> Result<Value, Trouble> {
-        let id = self.voice.say(request, with)?;
+        let id = self.requests.say(request, with)?;
         loop {
             let told = self.receive()?;
             if told["id"].as_u64() != Some(id) || told.get("event").is_some() {
@@ -189,7 +189,7 @@ impl Drop for Connection {
         if !self.leased {
             return;
         }
-        let Ok(id) = self.voice.say("lease", json!({ "how": "release" })) else {
+        let Ok(id) = self.requests.say("lease", json!({ "how": "release" })) else {
             return;
         };
         while let Ok(Ok(told)) = self.told.recv_timeout(RELEASED_WITHIN) {

@@ -12,7 +12,7 @@ use tandem_host::Command;
 use tandem_session::NextLine;
 use tandem_session::jog::{JogMessage, ReachMessage};
 
-use super::connection::{Connection, Trouble, Voice};
+use super::connection::{Connection, RequestSender, Trouble};
 use super::panel::RemotePanel;
 use super::work::{JobEnd, Work, exit_status, shown_position};
 use crate::args;
@@ -25,13 +25,7 @@ use crate::operator::{Keyboard, LOOK, Panel, Stops, press, tell};
 /// Has the controller jog.
 pub fn jog(at: &args::Connect, options: &args::Jog) -> Result<u8, Box<dyn Error>> {
     let session = &options.session;
-    let operator = &session.operator;
-    options.place.refuse_with_connect(&[
-        (session.clock != args::Clock::Wall, "--clock"),
-        (session.trace.is_some(), "--trace"),
-        (operator.listen.is_some(), "--listen"),
-        (operator.listen_tcp.is_some(), "--listen-tcp"),
-    ]);
+    options.place.refuse_with_connect(&session.of_own_drives());
     let work = Work::begin(Connection::open(at)?)?;
     let mut jogs = Jogs {
         work,
@@ -119,7 +113,7 @@ impl Jogs {
 
     fn keys(&self) -> Result<Keyboard, String> {
         let mut keys = JogKeys::new(Box::new(RemoteAxes {
-            voice: self.work.connection.voice.clone(),
+            requests: self.work.connection.requests.clone(),
             panel: Arc::clone(&self.work.panel),
             stops: self.work.stops(),
             axes: self.axes.clone(),
@@ -256,7 +250,7 @@ fn request(words: &JogMessage, axes: &[(char, bool)]) -> Result<Value, String> {
 
 /// The axes of a controller, for keys.
 struct RemoteAxes {
-    voice: Voice,
+    requests: RequestSender,
     panel: Arc<RemotePanel>,
     stops: Stops,
     axes: Vec<(char, bool)>,
@@ -280,14 +274,14 @@ impl JogPanel for RemoteAxes {
             // A repeat that was long on its way finds the machine at rest, and leaves it there.
             with["again"] = json!(true);
         }
-        let said = self.voice.say("jog", with);
+        let said = self.requests.say("jog", with);
         said.map(|_| ()).map_err(|gone| gone.words().to_string())
     }
 
     fn let_go(&self) {
         if self.moving.load(Relaxed) {
             // A connection that is gone is told by who listens.
-            let _ = self.voice.say("jog", json!({ "stop": true }));
+            let _ = self.requests.say("jog", json!({ "stop": true }));
         }
     }
 
@@ -296,7 +290,7 @@ impl JogPanel for RemoteAxes {
     }
 
     fn reset(&self) {
-        let _ = self.voice.say("reset", json!({}));
+        let _ = self.requests.say("reset", json!({}));
     }
 
     fn quit(&self) {

@@ -22,17 +22,12 @@ const MAX_AHEAD: usize = 200;
 /// Has the controller drive lines.
 pub fn mdi(at: &args::Connect, options: &args::Mdi) -> Result<u8, Box<dyn Error>> {
     let session = &options.session;
-    let operator = &session.operator;
-    options.place.refuse_with_connect(&[
-        (session.clock != args::Clock::Wall, "--clock"),
-        (session.trace.is_some(), "--trace"),
-        (operator.listen.is_some(), "--listen"),
-        (operator.listen_tcp.is_some(), "--listen-tcp"),
-        (options.block_delete, "--block-delete"),
-    ]);
+    let mut refused = session.of_own_drives().to_vec();
+    refused.push((options.block_delete, "--block-delete"));
+    options.place.refuse_with_connect(&refused);
     let work = Work::begin(Connection::open(at)?)?;
     let input = Input::new(work.keys);
-    let mut dialogue = Dialogue {
+    let mut remote = RemoteMdi {
         work,
         input,
         lines: 0,
@@ -41,18 +36,19 @@ pub fn mdi(at: &args::Connect, options: &args::Mdi) -> Result<u8, Box<dyn Error>
         refused: false,
         fault: false,
     };
-    if dialogue.work.keys {
+    if remote.work.keys {
         explain();
     }
-    let done = dialogue.work.prepare(session.reset, session.home);
+    let done = remote.work.prepare(session.reset, session.home);
     let done = done
-        .and_then(|()| dialogue.work.connection.release_lease())
-        .and_then(|()| dialogue.work.subscribe())
-        .and_then(|()| dialogue.talk());
-    Ok(exit_status(done, dialogue.fault, dialogue.refused))
+        .and_then(|()| remote.work.connection.release_lease())
+        .and_then(|()| remote.work.subscribe())
+        .and_then(|()| remote.talk());
+    Ok(exit_status(done, remote.fault, remote.refused))
 }
 
-struct Dialogue {
+/// Lines by hand that a controller drives.
+struct RemoteMdi {
     work: Work,
     input: Input,
     /// Lines that were read.
@@ -65,7 +61,7 @@ struct Dialogue {
     fault: bool,
 }
 
-impl Dialogue {
+impl RemoteMdi {
     fn talk(&mut self) -> Result<(), Trouble> {
         while !self.work.stops().are_asked() {
             // A pipe is read ahead, so that the controller plans through; a terminal waits for the rest.

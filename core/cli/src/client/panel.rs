@@ -5,20 +5,20 @@ use std::sync::{Mutex, PoisonError};
 use serde_json::{Value, json};
 use tandem_host::Command;
 
-use super::connection::Voice;
+use super::connection::RequestSender;
 use crate::operator::{Panel, PanelSwitches};
 
 /// Commands become requests, whose answers come by themselves.
 pub struct RemotePanel {
-    voice: Voice,
+    requests: RequestSender,
     switches: Mutex<PanelSwitches>,
 }
 
 impl RemotePanel {
     /// Nothing is known of the switches yet.
-    pub fn new(voice: Voice) -> Self {
+    pub fn new(requests: RequestSender) -> Self {
         Self {
-            voice,
+            requests,
             switches: Mutex::new(PanelSwitches {
                 hold: false,
                 single_block: false,
@@ -56,7 +56,7 @@ impl Panel for RemotePanel {
             Command::OptionalStop(on) | Command::SingleBlock(on) => json!({ "on": on }),
             _ => json!({}),
         };
-        self.voice
+        self.requests
             .say(command.name(), with)
             .map_err(|gone| gone.words().to_string())?;
         // Until the next status says how they stand.

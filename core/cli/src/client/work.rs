@@ -80,7 +80,7 @@ impl Work {
     /// # Errors
     /// The system's words.
     pub fn begin(connection: Connection) -> Result<Self, String> {
-        let panel = Arc::new(RemotePanel::new(connection.voice.clone()));
+        let panel = Arc::new(RemotePanel::new(connection.requests.clone()));
         Ok(Self {
             signals: Signals::catch(panel.clone())?,
             panel,
@@ -107,7 +107,7 @@ impl Work {
         let done = self.connection.ask(request, with)?;
         if stops.are_asked() {
             self.connection
-                .voice
+                .requests
                 .say(Command::Abort.name(), json!({}))?;
         }
         Ok(done)

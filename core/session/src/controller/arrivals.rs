@@ -6,16 +6,16 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
-
-use super::clerk::wait_while;
 
 /// Lines that may wait for the disk.
 const MAX_WAITING: usize = 16 * 1024;
 /// Stack of the thread, bytes: it is locked into memory with the rest.
 const STACK_BYTES: usize = 256 * 1024;
+/// How long the end of the controller waits for disks.
+const PATIENCE: Duration = Duration::from_secs(2);
 
 /// Writes what comes, in a thread of its own: whoever speaks waits for no disk.
 pub struct Arrivals {
@@ -114,5 +114,13 @@ impl Drop for Arrivals {
             // A disk that hangs keeps no process from ending.
             wait_while(|| !writer.is_finished());
         }
+    }
+}
+
+/// Waits while a disk `takes` its time, as long as the end of a controller may.
+pub fn wait_while(takes: impl Fn() -> bool) {
+    let began = Instant::now();
+    while takes() && began.elapsed() < PATIENCE {
+        thread::sleep(Duration::from_millis(1));
     }
 }

@@ -8,9 +8,9 @@ use serde_json::{Value, json};
 use tandem_host::Command;
 
 use super::described;
-use super::desk::{Answered, Books, Desk, From, Inner, Loaded, Mode, Order};
-use super::history::HELD;
+use super::dispatcher::{Answered, Dispatcher, Inner, Loaded, Mode, Order, RequestId, StateWrite};
 use super::lines::{TakenLine, lock};
+use super::persistence::HELD;
 use super::programs::{Upload, discard};
 use super::request::Asked;
 use super::states::{ControllerState, judge};
@@ -20,7 +20,7 @@ use crate::jog::{JogMessage, ReachMessage};
 /// Why what came before a stop is not begun behind it.
 pub const STOPPED: &str = "the machine was stopped before this was begun: ask again";
 
-impl Desk {
+impl Dispatcher {
     /// Whether an answer waits for a disk.
     pub fn waits_for_disk(&self, asked: &Asked) -> bool {
         match asked.name() {
@@ -48,13 +48,13 @@ impl Desk {
     }
 
     /// Judges a request by the state of the machine, and does it or orders it. May wait for a disk, where
-    /// [`Desk::waits_for_disk`] says so.
-    pub fn ask(&self, from: From, asked: &Asked) -> Answered {
+    /// [`Dispatcher::waits_for_disk`] says so.
+    pub fn ask(&self, from: RequestId, asked: &Asked) -> Answered {
         self.ask_since(from, asked, self.stops())
     }
 
     /// The same for a request that came when so many stops had been asked for: behind a later one it moves nothing.
-    pub fn ask_since(&self, from: From, asked: &Asked, stops: u64) -> Answered {
+    pub fn ask_since(&self, from: RequestId, asked: &Asked, stops: u64) -> Answered {
         let name = asked.name();
         let done = match name {
             "list" | "upload" | "acknowledge" => {
@@ -81,7 +81,13 @@ impl Desk {
     }
 
     /// What waits for nothing.
-    fn ask_now(&self, from: From, asked: &Asked, stops: u64, program: Option<Loaded>) -> Answered {
+    fn ask_now(
+        &self,
+        from: RequestId,
+        asked: &Asked,
+        stops: u64,
+        program: Option<Loaded>,
+    ) -> Answered {
         let name = asked.name();
         let mut inner = self.lock();
         if let Err(why) = self.may(&inner, asked, name, stops) {
@@ -107,7 +113,7 @@ impl Desk {
             (&inner.order, name),
             (Some(Order::Mdi), "mdi") | (Some(Order::Jog), "jog" | "jog-stop")
         );
-        if (inner.books == Books::Written || inner.order.is_some() && !joins)
+        if (inner.state_write == StateWrite::UnderWay || inner.order.is_some() && !joins)
             && begins_or_sets(name)
         {
             return Err("another request is being begun: wait for its answer".to_string());
@@ -119,16 +125,17 @@ impl Desk {
     fn change(&self, asked: &Asked, name: &str, stops: u64) -> Result<Value, String> {
         let mut inner = self.lock();
         self.may(&inner, asked, name, stops)?;
-        inner.books = Books::Written;
+        inner.state_write = StateWrite::UnderWay;
         drop(inner);
         let set = self.set(asked, name);
-        self.lock().books = Books::Closed;
+        self.lock().state_write = StateWrite::Idle;
         set
     }
 
     /// Judges a line that calls a subroutine, and takes it. Where something has come meanwhile it is judged once more behind that.
-    fn call(&self, from: From, asked: &Asked, stops: u64) -> Result<Value, String> {
-        let (text, files) = (asked.text("line")?, lock(&self.lines).files());
+    fn call(&self, from: RequestId, asked: &Asked, stops: u64) -> Result<Value, String> {
+        let text = asked.text("line")?;
+        let files = lock(&self.lines).files();
         loop {
             let inner = self.lock();
             self.may(&inner, asked, "mdi", stops)?;
@@ -168,7 +175,7 @@ impl Desk {
 
     fn act(
         &self,
-        from: From,
+        from: RequestId,
         asked: &Asked,
         name: &str,
         program: Option<Loaded>,

@@ -6,12 +6,9 @@ use serde_json::{Value, json};
 use tandem_host::JobOutcome;
 use tandem_state::{Alarm, Change, Driven, Job, JobEnd, JobKind, Outcome};
 
-use super::desk::{Desk, Mode};
-use super::keeper::Remembered;
+use super::dispatcher::{Dispatcher, Mode};
+use super::persistence::{HELD, Remembered};
 use super::request::Asked;
-
-/// Jobs and alarms that are held ready for clients; a state file keeps more.
-pub const HELD: usize = 100;
 
 /// What was driven, and what went wrong.
 pub struct History {
@@ -141,7 +138,7 @@ impl History {
     }
 }
 
-impl Desk {
+impl Dispatcher {
     /// What is driven from now on, for the history. The loop that drives.
     pub fn begin_history(&self, mode: Mode, name: &str) {
         let kind = match mode {
@@ -156,7 +153,7 @@ impl Desk {
         let hash = loaded.map_or(String::new(), |program| program.hash.clone());
         let job = inner.history.begin(kind, name, &hash, self.now_unix_ms());
         drop(inner);
-        self.keeper.record(Change::JobBegan(Box::new(job)));
+        self.persistence.record(Change::JobBegan(Box::new(job)));
     }
 
     /// Number and hash of the program or the lines that are driven, for the journal.
@@ -179,7 +176,7 @@ impl Desk {
             None,
             &json!({ "event": "alarm", "raised": alarm_shown(&alarm) }),
         );
-        self.keeper.record(Change::Raised(Box::new(alarm)));
+        self.persistence.record(Change::Raised(Box::new(alarm)));
     }
 
     /// Somebody has seen alarms; it is on disk when this returns.
@@ -191,7 +188,7 @@ impl Desk {
             id: *id,
             at_unix_ms,
         });
-        self.keeper.commit(changes.collect())?;
+        self.persistence.commit(changes.collect())?;
         self.lock().history.acknowledge(&numbers, at_unix_ms);
         self.send(None, &json!({ "event": "alarm", "acknowledged": numbers }));
         Ok(json!({ "acknowledged": numbers }))

@@ -9,9 +9,9 @@ use tandem_rings::{Rest, RestCause};
 use tandem_rough::Source;
 use tandem_sdk::{AxisVector, Block, BlockKind, EventKind, Planner};
 
-use super::desk::Order;
+use super::dispatcher::Order;
 use crate::judge::{JudgedLine, LineJudge, Refusal};
-use crate::standing::Standing;
+use crate::standstill::Standstill;
 
 /// Lines that may wait before they are planned.
 const MAX_WAITING: usize = 1000;
@@ -58,7 +58,7 @@ pub struct Lines {
     jogs: bool,
     /// What the last probe has found.
     probed: Option<Probed>,
-    stands: Standing,
+    stands: Standstill,
 }
 
 /// A line that is being judged while nobody holds the lines.
@@ -159,7 +159,7 @@ impl Lines {
             driving: false,
             jogs: false,
             probed: None,
-            stands: Standing::default(),
+            stands: Standstill::default(),
         }
     }
 
@@ -393,7 +393,8 @@ impl Lines {
             self.ahead = self.standing.clone();
             self.ahead.number_anew();
             self.ahead.keep_moments();
-            (self.count, self.told) = (0, None);
+            self.count = 0;
+            self.told = None;
         }
         Ok(begins)
     }
@@ -510,7 +511,8 @@ impl Lines {
             self.standing.set_switched_off();
         }
         self.standing.set_position(position);
-        (self.open, self.driving) = (false, false);
+        self.open = false;
+        self.driving = false;
         self.stands.moves();
         self.asks &= goes_on;
         if goes_on {
@@ -544,7 +546,8 @@ impl LineSource {
     /// A job takes lines from here on.
     pub fn begin(lines: &SharedLines) -> Self {
         let mut inner = lock(lines);
-        (inner.open, inner.driving) = (true, true);
+        inner.open = true;
+        inner.driving = true;
         inner.stands.moves();
         drop(inner);
         Self(Arc::clone(lines))

@@ -89,7 +89,8 @@ impl DrawnPath {
 
     /// Another path begins, that of `of`: of one that `streams` nobody knows how long it becomes.
     pub fn begin(&mut self, of: &str, streams: bool) {
-        let (axes, generation) = (self.axes, self.generation + 1);
+        let axes = self.axes;
+        let generation = self.generation + 1;
         *self = Self {
             generation,
             of: of.to_string(),

@@ -7,7 +7,7 @@ use std::time::SystemTime;
 
 use serde_json::{Value, json};
 
-use super::desk::{Desk, From, Loaded, MAX_PROGRAM_BYTES};
+use super::dispatcher::{Dispatcher, Loaded, MAX_PROGRAM_BYTES, RequestId};
 use super::request::Asked;
 
 /// A program on its way into the folder, part by part.
@@ -18,7 +18,7 @@ pub struct Upload {
     bytes: u64,
 }
 
-impl Desk {
+impl Dispatcher {
     /// A program, as text or as a file of the programs folder.
     pub fn program_of(&self, asked: &Asked) -> Result<Loaded, String> {
         if asked.with.contains_key("text") {
@@ -88,12 +88,13 @@ impl Desk {
     /// Takes a part of a program, and with the last one puts the whole in its place: nobody ever sees half of one.
     pub fn upload(
         &self,
-        from: From,
+        from: RequestId,
         asked: &Asked,
         pending: &mut Option<Upload>,
     ) -> Result<Value, String> {
         let folder = self.folder()?;
-        let (name, text) = (asked.text("name")?, asked.text("text")?);
+        let name = asked.text("name")?;
+        let text = asked.text("text")?;
         if !is_plain(name) {
             return Err(format!(
                 "{name}: a program that is brought has a plain name: letters, digits, space and -_.()+ without a dot in front"

@@ -9,7 +9,7 @@ use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 
-use super::clerk::wait_while;
+use super::arrivals::wait_while;
 use tandem_host::{Clock, JobOutcome};
 use tandem_machine::Machine;
 use tandem_recorder::{BlocksCsv, EventsCsv, RecordError, TraceCsv};
@@ -97,8 +97,10 @@ impl Records {
             ));
         }
         let (entries, coming) = sync_channel(self.max_behind);
-        let (folder, machine) = (folder.to_owned(), machine.clone());
-        let (told, counts) = (told.clone(), Arc::clone(&self.writers));
+        let folder = folder.to_owned();
+        let machine = machine.clone();
+        let told = told.clone();
+        let counts = Arc::clone(&self.writers);
         let builder = thread::Builder::new()
             .name("tandem-record".to_string())
             .stack_size(STACK_BYTES);

@@ -8,11 +8,10 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 use tandem_host::Clock;
 
-use super::desk::Desk;
-use super::serve::{ScriptLine, Tell};
-use super::talk::Protocol2;
+use super::dispatcher::Dispatcher;
+use super::protocol::Protocol2;
 use crate::grbl::{Sender, Settings};
-use crate::operator::{Lease, Talk};
+use crate::operator::{Lease, Protocol};
 
 /// Senders that were added by [`super::Controller::add_sender`] have numbers from this one on.
 const FIRST_ADDED: u64 = 1 << 32;
@@ -28,10 +27,51 @@ struct AddedSender {
     sender: Box<dyn VirtualSender>,
 }
 
+/// A line of a client, before a fine period of the process.
+#[derive(Clone, Debug)]
+pub struct ScriptLine {
+    /// The fine period.
+    pub tick: u64,
+    /// The client's number.
+    pub client: u64,
+    /// What it says; empty where it leaves.
+    pub line: String,
+}
+
+impl ScriptLine {
+    /// Reads `{"tick":120,"client":1,"say":{"id":1,"request":"status"}}`; without a client it is number 1. With `"leaves":true` in
+    /// place of what it says the client is gone, which is an empty line.
+    ///
+    /// # Errors
+    /// What is wrong with the line.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let value: Value = serde_json::from_str(text).map_err(|e| e.to_string())?;
+        let tick = value["tick"]
+            .as_u64()
+            .ok_or("it has no \"tick\", the number of a fine period")?;
+        let client = value
+            .get("client")
+            .map_or(Some(1), Value::as_u64)
+            .ok_or("\"client\" is a number")?;
+        if value["leaves"] == true {
+            let line = String::new();
+            return Ok(Self { tick, client, line });
+        }
+        let say = value
+            .get("say")
+            .ok_or("it has no \"say\", the line of the client")?;
+        let line = say.as_str().map_or_else(|| say.to_string(), str::to_string);
+        Ok(Self { tick, client, line })
+    }
+}
+
+/// Who is told what the controller has to say beside its protocol, and on the virtual clock the protocol.
+pub type Tell<'a> = &'a mut dyn FnMut(&str);
+
 /// The clients of a controller on the virtual clock.
 pub struct Script {
     pub lines: VecDeque<ScriptLine>,
-    clients: BTreeMap<u64, Box<dyn Talk>>,
+    clients: BTreeMap<u64, Box<dyn Protocol>>,
     senders: Vec<AddedSender>,
     /// What senders have heard since they were asked last.
     heard: BTreeMap<u64, String>,
@@ -59,35 +99,41 @@ impl Script {
     }
 
     /// Adds a sender, which speaks from the next fine period on.
-    pub fn add_sender(&mut self, desk: &Arc<Desk>, sender: Box<dyn VirtualSender>) {
+    pub fn add_sender(&mut self, dispatcher: &Arc<Dispatcher>, sender: Box<dyn VirtualSender>) {
         let number = FIRST_ADDED + self.senders.len() as u64;
-        self.client(desk, number, true);
+        self.client(dispatcher, number, true);
         self.senders.push(AddedSender { number, sender });
     }
 
-    fn client(&mut self, desk: &Arc<Desk>, number: u64, sends: bool) -> &mut Box<dyn Talk> {
-        let (lease, settings) = (&mut self.lease, &self.settings);
+    fn client(
+        &mut self,
+        dispatcher: &Arc<Dispatcher>,
+        number: u64,
+        sends: bool,
+    ) -> &mut Box<dyn Protocol> {
+        let lease = &mut self.lease;
+        let settings = &self.settings;
         self.clients.entry(number).or_insert_with(|| {
-            let desk = Arc::clone(desk);
-            let talk: Box<dyn Talk> = if sends {
+            let dispatcher = Arc::clone(dispatcher);
+            let protocol: Box<dyn Protocol> = if sends {
                 let place = "the virtual clock";
-                Box::new(Sender::new(desk, Arc::clone(settings), number, place).greeted())
+                Box::new(Sender::new(dispatcher, Arc::clone(settings), number, place).greeted())
             } else {
-                Box::new(Protocol2::known(desk, number))
+                Box::new(Protocol2::known(dispatcher, number))
             };
-            lease.introduce(number, talk.name());
-            talk
+            lease.introduce(number, protocol.name());
+            protocol
         })
     }
 
     /// Machine time as wall time, so that what lasts for a while lasts as long in every replay.
-    fn now(&self, desk: &Desk, tick: u64) -> Instant {
-        self.began + Duration::from_secs_f64(tick as f64 * desk.machine.fine_period_s)
+    fn now(&self, dispatcher: &Dispatcher, tick: u64) -> Instant {
+        self.began + Duration::from_secs_f64(tick as f64 * dispatcher.machine.fine_period_s)
     }
 
     /// What is due before the fine period `tick`.
-    pub fn say_due(&mut self, desk: &Arc<Desk>, tick: u64, tell: Tell<'_>) {
-        let now = self.now(desk, tick);
+    pub fn say_due(&mut self, dispatcher: &Arc<Dispatcher>, tick: u64, tell: Tell<'_>) {
+        let now = self.now(dispatcher, tick);
         while self.lines.front().is_some_and(|line| line.tick <= tick) {
             let Some(ScriptLine { client, line, .. }) = self.lines.pop_front() else {
                 return;
@@ -98,13 +144,13 @@ impl Script {
                 continue;
             }
             let bytes = bytes_of(&line);
-            self.client(desk, client, bytes.is_some());
-            let Some(talk) = self.clients.get_mut(&client) else {
+            self.client(dispatcher, client, bytes.is_some());
+            let Some(protocol) = self.clients.get_mut(&client) else {
                 return;
             };
             let answer = match bytes {
-                Some(bytes) => talk.bytes(&bytes, &mut self.lease, now),
-                None => talk.line(&line, &mut self.lease, now),
+                Some(bytes) => protocol.bytes(&bytes, &mut self.lease, now),
+                None => protocol.line(&line, &mut self.lease, now),
             };
             self.print(tick, Some(client), &answer.line, tell);
         }
@@ -112,14 +158,14 @@ impl Script {
         let raw: Vec<u64> = self
             .clients
             .iter()
-            .filter(|(_, talk)| talk.is_raw())
+            .filter(|(_, protocol)| protocol.is_raw())
             .map(|(number, _)| *number)
             .collect();
         for number in raw {
-            let Some(talk) = self.clients.get_mut(&number) else {
+            let Some(protocol) = self.clients.get_mut(&number) else {
                 continue;
             };
-            let said = talk.turn(&mut self.lease, now);
+            let said = protocol.turn(&mut self.lease, now);
             self.print(tick, Some(number), &said, tell);
         }
     }
@@ -137,8 +183,8 @@ impl Script {
             }
         }
         for (number, bytes) in said {
-            if let Some(talk) = self.clients.get_mut(&number).filter(|_| !bytes.is_empty()) {
-                let answer = talk.bytes(&bytes, &mut self.lease, now);
+            if let Some(protocol) = self.clients.get_mut(&number).filter(|_| !bytes.is_empty()) {
+                let answer = protocol.bytes(&bytes, &mut self.lease, now);
                 self.print(tick, Some(number), &answer.line, tell);
             }
         }
@@ -159,29 +205,33 @@ impl Script {
         }
         if number >= FIRST_ADDED {
             self.heard.entry(number).or_default().push_str(line);
-        } else if self.clients.get(&number).is_some_and(|talk| talk.is_raw()) {
+        } else if self
+            .clients
+            .get(&number)
+            .is_some_and(|protocol| protocol.is_raw())
+        {
             tell(&json!({ "tick": tick, "client": number, "told": { "grbl": line } }).to_string());
         } else {
             print(tick, client, line, tell);
         }
     }
 
-    /// Hands out post of the desk.
-    pub fn flush(&mut self, desk: &Desk, tick: u64, clock: Clock, tell: Tell<'_>) {
+    /// Hands out lines that no client has asked for.
+    pub fn flush(&mut self, dispatcher: &Dispatcher, tick: u64, clock: Clock, tell: Tell<'_>) {
         if clock != Clock::Virtual {
             return;
         }
-        for (client, line) in desk.take_post() {
+        for (client, line) in dispatcher.take_post() {
             let for_it = |number: &u64| client.is_none_or(|client| client == *number);
             let raw: Vec<u64> = self
                 .clients
                 .iter()
-                .filter(|(number, talk)| talk.is_raw() && for_it(number))
+                .filter(|(number, protocol)| protocol.is_raw() && for_it(number))
                 .map(|(number, _)| *number)
                 .collect();
             for number in &raw {
-                if let Some(talk) = self.clients.get_mut(number) {
-                    let told = talk.told(&line);
+                if let Some(protocol) = self.clients.get_mut(number) {
+                    let told = protocol.told(&line);
                     self.print(tick, Some(*number), &told, tell);
                 }
             }
@@ -189,11 +239,11 @@ impl Script {
                 print(tick, client, &line, tell);
             }
         }
-        for (client, frame) in desk.take_frames() {
+        for (client, frame) in dispatcher.take_frames() {
             print(
                 tick,
                 Some(client),
-                &super::talk::frame_line(0, &frame),
+                &super::protocol::frame_line(0, &frame),
                 tell,
             );
         }

@@ -9,7 +9,7 @@ use tandem_recorder::rpm;
 use tandem_rings::Switched;
 use tandem_sdk::AxisVector;
 
-use super::desk::{Desk, Inner, Mode};
+use super::dispatcher::{Dispatcher, Inner, Mode};
 use super::lines::lock;
 use crate::operator::{Position, StatusLine};
 
@@ -47,7 +47,7 @@ pub struct Shown {
     state_trouble: Option<String>,
 }
 
-impl Desk {
+impl Dispatcher {
     /// Everything that can be seen. Allocates.
     pub fn shown(&self) -> Shown {
         self.shown_of(&self.lock())
@@ -67,7 +67,8 @@ impl Desk {
         let place = self.hub.position();
         let lines = lock(&self.lines);
         let standing = lines.standing();
-        let (in_force, modal) = (standing.in_force(), standing.modal_words());
+        let in_force = standing.in_force();
+        let modal = standing.modal_words();
         let work_position = standing.to_program(&place);
         drop(lines);
         let shown = |vector: &AxisVector| Position::new(axes, vector);
@@ -112,7 +113,7 @@ impl Desk {
             block_delete: inner.block_delete,
             alarms: inner.history.open_alarms(),
             job_number: inner.history.open(),
-            state_trouble: self.keeper.trouble(),
+            state_trouble: self.persistence.trouble(),
         }
     }
 

@@ -1,4 +1,4 @@
-//! The loop that drives: orders of the desk become jobs, one after the other.
+//! The loop that drives: orders of the dispatcher become jobs, one after the other.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -15,14 +15,14 @@ use tandem_state::Change;
 
 use super::arrivals::Arrivals;
 use super::ask::STOPPED;
-use super::clerk;
-use super::desk::{Desk, From, Loaded, Mode, Order};
-use super::keeper::Keeper;
+use super::disk_work;
+use super::dispatcher::{Dispatcher, Loaded, Mode, Order, RequestId};
 use super::lines::{LineSource, Lines, lock};
 use super::path::DrawnPath;
+use super::persistence::Persistence;
+use super::protocol::ControllerService;
 use super::record::{Raise, Recording, Records};
-use super::script::{Script, VirtualSender};
-use super::talk::Office;
+use super::script::{Script, ScriptLine, Tell, VirtualSender};
 use super::watch::{Notes, Refusals, Watch};
 use crate::HOMING;
 use crate::jog::{JogController, Jogging};
@@ -67,51 +67,10 @@ impl Options {
     }
 }
 
-/// A line of a client, before a fine period of the process.
-#[derive(Clone, Debug)]
-pub struct ScriptLine {
-    /// The fine period.
-    pub tick: u64,
-    /// The client's number.
-    pub client: u64,
-    /// What it says; empty where it leaves.
-    pub line: String,
-}
-
-impl ScriptLine {
-    /// Reads `{"tick":120,"client":1,"say":{"id":1,"request":"status"}}`; without a client it is number 1. With `"leaves":true` in
-    /// place of what it says the client is gone, which is an empty line.
-    ///
-    /// # Errors
-    /// What is wrong with the line.
-    pub fn parse(text: &str) -> Result<Self, String> {
-        let value: Value = serde_json::from_str(text).map_err(|e| e.to_string())?;
-        let tick = value["tick"]
-            .as_u64()
-            .ok_or("it has no \"tick\", the number of a fine period")?;
-        let client = value
-            .get("client")
-            .map_or(Some(1), Value::as_u64)
-            .ok_or("\"client\" is a number")?;
-        if value["leaves"] == true {
-            let line = String::new();
-            return Ok(Self { tick, client, line });
-        }
-        let say = value
-            .get("say")
-            .ok_or("it has no \"say\", the line of the client")?;
-        let line = say.as_str().map_or_else(|| say.to_string(), str::to_string);
-        Ok(Self { tick, client, line })
-    }
-}
-
-/// Who is told what the controller has to say beside its protocol, and on the virtual clock the protocol.
-pub type Tell<'a> = &'a mut dyn FnMut(&str);
-
 /// A controller that stays.
 pub struct Controller<'r> {
     resident: Resident<'r>,
-    desk: Arc<Desk>,
+    dispatcher: Arc<Dispatcher>,
     /// Until the controller ends.
     server: Option<Server>,
     clock: Clock,
@@ -129,7 +88,7 @@ impl<'r> Controller<'r> {
         machine: &Machine,
         registry: &'r Registry,
         options: Options,
-        keeper: Box<dyn Keeper>,
+        persistence: Box<dyn Persistence>,
     ) -> Result<Self, HostError> {
         let system = |why: String| HostError::System(why);
         let simulated = !moves_metal(machine, registry);
@@ -154,41 +113,41 @@ impl<'r> Controller<'r> {
         let hub = Arc::new(OperatorHub::new(&machine, controls, Arc::clone(&status)));
         let lines = Arc::new(std::sync::Mutex::new(lines));
         let unknown = not_homed(&machine, resident.unknown_axes());
-        let keepsakes = keeper.remembered().policy_parameters;
-        let mut desk = Desk::new(
+        let keepsakes = persistence.remembered().policy_parameters;
+        let mut dispatcher = Dispatcher::new(
             &machine,
             hub,
             status,
             lines,
             jogs,
-            keeper,
+            persistence,
             options.programs,
             unknown,
         )
         .map_err(system)?;
-        desk.has_bus = resident.has_bus();
+        dispatcher.has_bus = resident.has_bus();
         let arrivals = options.arrivals.as_deref();
         let arrivals = arrivals.map(|path| Arrivals::create(path, machine.fine_period_s));
-        desk.arrivals = arrivals.transpose().map_err(system)?;
-        let desk = Arc::new(desk);
+        dispatcher.arrivals = arrivals.transpose().map_err(system)?;
+        let dispatcher = Arc::new(dispatcher);
         if options.clock == Clock::Virtual {
-            desk.set_replay_time(0.0);
+            dispatcher.set_replay_time(0.0);
         }
         for (name, value) in keepsakes {
             // A script that has changed knows it no longer: then the machine file counts, and somebody is told.
             if let Err(why) = resident.set_policy_parameter(&name, value) {
-                desk.raise(
+                dispatcher.raise(
                     "policy-parameter",
                     &format!("{name} = {value} of the state: {why}"),
                 );
             }
         }
-        desk.lock().policy_parameters = resident.policy_parameters();
-        desk.lock().declared_parameters = declared(resident.declared_parameters()?);
-        desk.stands(&machine.start, unknown);
+        dispatcher.lock().policy_parameters = resident.policy_parameters();
+        dispatcher.lock().declared_parameters = declared(resident.declared_parameters()?);
+        dispatcher.stands(&machine.start, unknown);
         if options.enable {
-            desk.lock().order = Some(Order::Enable {
-                from: From { client: 0, id: 0 },
+            dispatcher.lock().order = Some(Order::Enable {
+                from: RequestId { client: 0, id: 0 },
                 resets: false,
                 emergency_stops: 0,
             });
@@ -196,21 +155,21 @@ impl<'r> Controller<'r> {
         let server = if options.listen.is_nowhere() {
             None
         } else {
-            let office = Office {
-                desk: Arc::clone(&desk),
+            let service = ControllerService {
+                dispatcher: Arc::clone(&dispatcher),
                 settings: Arc::default(),
             };
-            Some(Server::of(Arc::new(office), &options.listen).map_err(system)?)
+            Some(Server::of(Arc::new(service), &options.listen).map_err(system)?)
         };
         let script = Script::new(options.script);
         let records = options.record.map(|root| {
-            let desk = Arc::clone(&desk);
-            let raise: Raise = Arc::new(move |why: &str| desk.raise("record", why));
+            let dispatcher = Arc::clone(&dispatcher);
+            let raise: Raise = Arc::new(move |why: &str| dispatcher.raise("record", why));
             Records::new(root, options.clock, machine.rough_period_s, raise)
         });
         Ok(Self {
             resident,
-            desk,
+            dispatcher,
             server,
             clock: options.clock,
             script,
@@ -231,13 +190,13 @@ impl<'r> Controller<'r> {
 
     /// On the virtual clock, somebody sends lines as grbl is sent them, until it hangs up. Before the run.
     pub fn add_sender(&mut self, sender: Box<dyn VirtualSender>) {
-        self.script.add_sender(&self.desk, sender);
+        self.script.add_sender(&self.dispatcher, sender);
     }
 
     /// What ends the controller, for signals: the machine comes to rest on the path, and its drives let go.
     pub fn ender(&self) -> impl Fn() + Send + Sync + 'static {
-        let desk = Arc::clone(&self.desk);
-        move || desk.end()
+        let dispatcher = Arc::clone(&self.dispatcher);
+        move || dispatcher.end()
     }
 
     /// Drives what is ordered, until it is told to end; on the virtual clock, until the script is over.
@@ -245,41 +204,45 @@ impl<'r> Controller<'r> {
     /// # Errors
     /// The computer refuses, or the drives were not let go of.
     pub fn run(mut self, tell: Tell<'_>) -> Result<(), HostError> {
-        while !self.desk.is_over() {
-            self.desk.tell_state();
-            let order = self.desk.lock().order.clone();
-            let order = order.or_else(|| lock(&self.desk.lines).next_order());
+        while !self.dispatcher.is_over() {
+            self.dispatcher.tell_state();
+            let order = self.dispatcher.lock().order.clone();
+            let order = order.or_else(|| lock(&self.dispatcher.lines).next_order());
             match order {
                 Some(order) => self.obey(order, tell)?,
                 None if self.clock == Clock::Virtual && self.script.is_over() => break,
                 None => {
                     if let Some(words) = self.idle(tell)? {
-                        self.desk.fault(&words);
+                        self.dispatcher.fault(&words);
                     }
                 }
             }
         }
         // Lines that came at the end, behind the last job.
-        self.desk.give_up_order(self.resident.machine().start);
-        self.script
-            .flush(&self.desk, self.resident.uptime_periods(), self.clock, tell);
+        self.dispatcher.give_up_order(self.resident.machine().start);
+        self.script.flush(
+            &self.dispatcher,
+            self.resident.uptime_periods(),
+            self.clock,
+            tell,
+        );
         self.resident.stop(&mut Notes(tell))?;
-        let lasting = lock(&self.desk.lines).standing().lasting();
-        self.desk.keep(lasting);
+        let lasting = lock(&self.dispatcher.lines).standing().lasting();
+        self.dispatcher.keep(lasting);
         drop(self.server);
-        clerk::wait_for_all(&self.desk);
+        disk_work::wait_for_all(&self.dispatcher);
         if let Some(records) = &self.records {
             records.wait_for_all();
         }
         // Nobody is acknowledged by it: what could not be written was told meanwhile, and is tried once more.
-        let _ = self.desk.keeper.commit(vec![]);
+        let _ = self.dispatcher.persistence.commit(vec![]);
         Ok(())
     }
 
     /// One rough period in which nothing is driven; the fault that ends the enabled state in it, in words.
     fn idle(&mut self, tell: Tell<'_>) -> Result<Option<String>, HostError> {
         let mut watch = Watch::new(
-            &self.desk,
+            &self.dispatcher,
             &mut self.script,
             tell,
             Mode::Idle,
@@ -300,7 +263,7 @@ impl<'r> Controller<'r> {
             } => self.check(from, &program, load),
             Order::Start { from } => self.start(from, tell)?,
             Order::Mdi => {
-                let source = Box::new(LineSource::begin(&self.desk.lines));
+                let source = Box::new(LineSource::begin(&self.dispatcher.lines));
                 let switches = Switches {
                     pause_at_stops: true,
                     ..self.switches()
@@ -311,7 +274,7 @@ impl<'r> Controller<'r> {
             Order::JogLines => {
                 // What let go of the one before is over.
                 self.resident.controls().jog.let_go.store(false, Relaxed);
-                let source = Box::new(LineSource::begin(&self.desk.lines));
+                let source = Box::new(LineSource::begin(&self.dispatcher.lines));
                 let switches = Switches {
                     unhomed: true,
                     ..self.switches()
@@ -320,8 +283,8 @@ impl<'r> Controller<'r> {
                 self.drive_or_tell(job, None, Mode::Jog, "jogging", tell)?;
             }
             Order::Jog => {
-                let refusals = Refusals(Arc::clone(&self.desk));
-                let source = Jogging::until_still(&self.desk.jogs, Box::new(refusals));
+                let refusals = Refusals(Arc::clone(&self.dispatcher));
+                let source = Jogging::until_still(&self.dispatcher.jogs, Box::new(refusals));
                 let source = Box::new(source);
                 let switches = Switches {
                     unhomed: true,
@@ -343,14 +306,16 @@ impl<'r> Controller<'r> {
                 while !self.resident.disable() {
                     if let Some(words) = self.idle(tell)? {
                         // Whoever asked is answered with it.
-                        self.desk.fault(&words);
+                        self.dispatcher.fault(&words);
                         return Ok(());
                     }
                 }
-                let mut inner = self.desk.lock();
-                (inner.enabled, inner.order) = (false, None);
+                let mut inner = self.dispatcher.lock();
+                inner.enabled = false;
+                inner.order = None;
                 drop(inner);
-                self.desk.answer(from, Ok(json!({ "disabled": true })));
+                self.dispatcher
+                    .answer(from, Ok(json!({ "disabled": true })));
             }
             Order::SetPolicyParameter { from, name, value } => {
                 self.set_policy_parameter(from, &name, value);
@@ -361,14 +326,14 @@ impl<'r> Controller<'r> {
 
     fn switches(&self) -> Switches {
         Switches {
-            block_delete: self.desk.lock().block_delete,
+            block_delete: self.dispatcher.lock().block_delete,
             optional_stop: self.resident.controls().optional_stop.load(Relaxed),
             ..Switches::default()
         }
     }
 
     fn memory(&self) -> Memory {
-        let lines = lock(&self.desk.lines);
+        let lines = lock(&self.dispatcher.lines);
         Memory {
             lasting: Arc::new(lines.standing().lasting()),
             ledger: lines.ledger.clone(),
@@ -376,13 +341,13 @@ impl<'r> Controller<'r> {
         }
     }
 
-    fn set_policy_parameter(&mut self, from: From, name: &str, value: f64) {
+    fn set_policy_parameter(&mut self, from: RequestId, name: &str, value: f64) {
         let before = self.resident.policy_parameters();
         let set = self.resident.set_policy_parameter(name, value);
         let kept = set.map_err(|e| e.to_string()).and_then(|()| {
             let name = name.to_string();
-            self.desk
-                .keeper
+            self.dispatcher
+                .persistence
                 .commit(vec![Change::PolicyParameter { name, value }])
         });
         if let (Err(_), Some(before)) = (&kept, before.get(name)) {
@@ -390,11 +355,11 @@ impl<'r> Controller<'r> {
             let _ = self.resident.set_policy_parameter(name, *before);
         }
         let parameters = self.resident.policy_parameters();
-        let mut inner = self.desk.lock();
+        let mut inner = self.dispatcher.lock();
         inner.order = None;
         inner.policy_parameters.clone_from(&parameters);
         drop(inner);
-        self.desk
+        self.dispatcher
             .answer(from, kept.map(|()| json!({ "parameters": parameters })));
     }
 
@@ -424,7 +389,7 @@ impl<'r> Controller<'r> {
             })
     }
 
-    fn check(&mut self, from: From, program: &Loaded, load: bool) {
+    fn check(&mut self, from: RequestId, program: &Loaded, load: bool) {
         let mut drawn = DrawnPath::new(self.resident.machine().axes);
         let checked = self.prepare(program, &mut drawn).map(|job| {
             let report = job.checked();
@@ -433,29 +398,29 @@ impl<'r> Controller<'r> {
                 "warnings": report.warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
             })
         });
-        let mut inner = self.desk.lock();
+        let mut inner = self.dispatcher.lock();
         inner.order = None;
         if checked.is_ok() && load {
             inner.loaded = Some(program.clone());
-            self.desk.path().become_that_of(drawn, &program.name);
+            self.dispatcher.path().become_that_of(drawn, &program.name);
         }
         drop(inner);
-        self.desk.answer(from, checked);
+        self.dispatcher.answer(from, checked);
     }
 
-    fn start(&mut self, from: From, tell: Tell<'_>) -> Result<(), HostError> {
-        let loaded = self.desk.lock().loaded.clone();
+    fn start(&mut self, from: RequestId, tell: Tell<'_>) -> Result<(), HostError> {
+        let loaded = self.dispatcher.lock().loaded.clone();
         let Some(program) = loaded else { return Ok(()) };
         let mut drawn = DrawnPath::new(self.resident.machine().axes);
         match self.prepare(&program, &mut drawn) {
             Err(why) => {
-                self.desk.give_up_order(self.resident.machine().start);
-                self.desk.answer(from, Err(why));
+                self.dispatcher.give_up_order(self.resident.machine().start);
+                self.dispatcher.answer(from, Err(why));
                 Ok(())
             }
             Ok(job) => {
                 // As it is driven: offsets may be others than when it was loaded.
-                self.desk.path().become_that_of(drawn, &program.name);
+                self.dispatcher.path().become_that_of(drawn, &program.name);
                 self.drive(job, Some(from), Mode::Program, &program.name, tell)
             }
         }
@@ -464,7 +429,7 @@ impl<'r> Controller<'r> {
     fn drive_or_tell(
         &mut self,
         job: Result<PreparedJob, HostError>,
-        from: Option<From>,
+        from: Option<RequestId>,
         mode: Mode,
         name: &str,
         tell: Tell<'_>,
@@ -472,10 +437,10 @@ impl<'r> Controller<'r> {
         match job {
             Ok(job) => self.drive(job, from, mode, name, tell),
             Err(why) => {
-                self.desk.give_up_order(self.resident.machine().start);
+                self.dispatcher.give_up_order(self.resident.machine().start);
                 match from {
-                    Some(from) => self.desk.answer(from, Err(why.to_string())),
-                    None => self.desk.tell_refused(name, &why.to_string()),
+                    Some(from) => self.dispatcher.answer(from, Err(why.to_string())),
+                    None => self.dispatcher.tell_refused(name, &why.to_string()),
                 }
                 Ok(())
             }
@@ -485,30 +450,30 @@ impl<'r> Controller<'r> {
     fn drive(
         &mut self,
         job: PreparedJob,
-        from: Option<From>,
+        from: Option<RequestId>,
         mode: Mode,
         name: &str,
         tell: Tell<'_>,
     ) -> Result<(), HostError> {
         let length_mm = job.checked().length_mm;
-        if !self.desk.begin(mode) {
-            self.desk.give_up_order(self.resident.machine().start);
+        if !self.dispatcher.begin(mode) {
+            self.dispatcher.give_up_order(self.resident.machine().start);
             if let Some(from) = from {
-                self.desk.answer(from, Err(STOPPED.to_string()));
+                self.dispatcher.answer(from, Err(STOPPED.to_string()));
             }
             return Ok(());
         }
         if mode != Mode::Program {
-            self.desk.path().begin(name, true);
+            self.dispatcher.path().begin(name, true);
         }
-        self.desk.scope().begin_job(&job.signals());
-        self.desk.begin_history(mode, name);
+        self.dispatcher.scope().begin_job(&job.signals());
+        self.dispatcher.begin_history(mode, name);
         let recording = self.recording(mode, job.signals());
         if let Some(from) = from {
-            self.desk.answer(from, Ok(json!({ "begins": name })));
+            self.dispatcher.answer(from, Ok(json!({ "begins": name })));
         }
         let mut watch = Watch::new(
-            &self.desk,
+            &self.dispatcher,
             &mut self.script,
             &mut *tell,
             mode,
@@ -518,8 +483,11 @@ impl<'r> Controller<'r> {
         watch.recording = recording;
         let mut outcome = self.resident.drive(job, &mut watch)?;
         let recording = watch.recording.take();
-        self.desk.settle(mode, &outcome);
-        while !self.desk.close(mode, name, &outcome, self.unknown_axes()) {
+        self.dispatcher.settle(mode, &outcome);
+        while !self
+            .dispatcher
+            .close(mode, name, &outcome, self.unknown_axes())
+        {
             self.abort_late(&mut outcome, tell)?;
         }
         if let Some(recording) = recording {
@@ -531,20 +499,23 @@ impl<'r> Controller<'r> {
     /// The files that a job leaves, where they are kept.
     fn recording(&self, mode: Mode, signals: Vec<String>) -> Option<Recording> {
         let records = self.records.as_ref()?;
-        let number = self.desk.lock().history.open()?;
+        let number = self.dispatcher.lock().history.open()?;
         Some(records.begin((number, mode.name()), self.resident.machine(), signals))
     }
 
     /// An abort came when the path had come to its end and nobody had been told: what is on goes off all the same, and the job is
     /// aborted.
     fn abort_late(&mut self, outcome: &mut JobOutcome, tell: Tell<'_>) -> Result<(), HostError> {
-        let (desk, script) = (&self.desk, &mut self.script);
-        let mut watch = Watch::new(desk, script, tell, Mode::Idle, self.clock, 0.0);
+        let dispatcher = &self.dispatcher;
+        let script = &mut self.script;
+        let mut watch = Watch::new(dispatcher, script, tell, Mode::Idle, self.clock, 0.0);
         let stopped = self.resident.switch_off(&mut watch)?;
-        (outcome.aborted, outcome.left) = (true, stopped.left);
-        (outcome.fault, outcome.summary.fault) = (stopped.fault, stopped.summary.fault);
+        outcome.aborted = true;
+        outcome.left = stopped.left;
+        outcome.fault = stopped.fault;
+        outcome.summary.fault = stopped.summary.fault;
         outcome.summary.stopped = stopped.summary.stopped;
-        self.desk.settle_late_abort(outcome);
+        self.dispatcher.settle_late_abort(outcome);
         Ok(())
     }
 
@@ -552,14 +523,14 @@ impl<'r> Controller<'r> {
         not_homed(self.resident.machine(), self.resident.unknown_axes())
     }
 
-    fn enable(&mut self, from: From, resets: bool, emergency_stops: u64, tell: Tell<'_>) {
-        if !self.desk.begin_enabling(emergency_stops) {
-            self.desk.answer(from, Err(STOPPED.to_string()));
-            self.desk.tell_state();
+    fn enable(&mut self, from: RequestId, resets: bool, emergency_stops: u64, tell: Tell<'_>) {
+        if !self.dispatcher.begin_enabling(emergency_stops) {
+            self.dispatcher.answer(from, Err(STOPPED.to_string()));
+            self.dispatcher.tell_state();
             return;
         }
         let mut watch = Watch::new(
-            &self.desk,
+            &self.dispatcher,
             &mut self.script,
             tell,
             Mode::Enabling,
@@ -570,22 +541,22 @@ impl<'r> Controller<'r> {
             Ok(outcome) => outcome,
             Err(why) => {
                 // The machine stays where it was; who can, resets once more.
-                self.desk.fault(&why.to_string());
-                self.desk.answer(from, Err(why.to_string()));
+                self.dispatcher.fault(&why.to_string());
+                self.dispatcher.answer(from, Err(why.to_string()));
                 return;
             }
         };
-        self.desk.settle(Mode::Enabling, &outcome);
+        self.dispatcher.settle(Mode::Enabling, &outcome);
         // An abort that comes when the drives hold finds nothing that moves.
         let _ = self
-            .desk
+            .dispatcher
             .close(Mode::Enabling, "enabling", &outcome, self.unknown_axes());
         let answer = match &outcome.summary.fault {
             Some(fault) => Err(fault.clone()),
             None if outcome.aborted => Err("it was aborted".to_string()),
             None => Ok(json!({ "enabled": true })),
         };
-        self.desk.answer(from, answer);
+        self.dispatcher.answer(from, answer);
     }
 
     /// Whether all drives are simulated.

@@ -8,11 +8,11 @@ use tandem_gcode::{Lasting, Tool, system_code};
 use tandem_sdk::AxisVector;
 use tandem_state::Change;
 
-use super::desk::Desk;
+use super::dispatcher::Dispatcher;
 use super::lines::lock;
 use super::request::Asked;
 
-impl Desk {
+impl Dispatcher {
     /// Changes what lasts; it is on disk when this returns.
     pub fn set(&self, asked: &Asked, name: &str) -> Result<Value, String> {
         let lines = lock(&self.lines);
@@ -68,7 +68,7 @@ impl Desk {
         changes.push(Change::Program(Arc::new(lasting.clone())));
         // Nothing else changes meanwhile what lasts: nothing is driven, and nothing is begun.
         drop(lines);
-        self.keeper.commit(changes)?;
+        self.persistence.commit(changes)?;
         lock(&self.lines).set_lasting(&lasting);
         Ok(json!({ "set": name }))
     }

@@ -1,4 +1,4 @@
-//! What senders ask of the desk who stream lines and do not wait for answers in JSON: lines and jogs that are taken or come too
+//! What senders ask of the dispatcher who stream lines and do not wait for answers in JSON: lines and jogs that are taken or come too
 //! early, stops, and what they are shown.
 
 use std::sync::Arc;
@@ -9,7 +9,7 @@ use tandem_host::Command;
 use tandem_rings::Status;
 use tandem_sdk::{AxisVector, Block};
 
-use super::desk::{Books, Desk, From, Inner, Mode, Order};
+use super::dispatcher::{Dispatcher, Inner, Mode, Order, RequestId, StateWrite};
 use super::lines::{Lines, TakenLine, lock};
 use super::states::{ControllerState, judge};
 use crate::judge::Refusal;
@@ -29,16 +29,16 @@ pub enum NotTaken {
     Refused(Refusal),
 }
 
-impl From {
+impl RequestId {
     /// Nobody waits for the answer.
     pub fn nobody() -> Self {
         Self { client: 0, id: 0 }
     }
 }
 
-impl Desk {
+impl Dispatcher {
     /// Judges a line of a sender and takes it.
-    pub fn take_line(&self, from: From, text: &str) -> Result<TakenLine, NotTaken> {
+    pub fn take_line(&self, from: RequestId, text: &str) -> Result<TakenLine, NotTaken> {
         let mut inner = self.lock();
         let mut lines = lock(&self.lines);
         self.may_take_line(&inner, &lines)?;
@@ -58,7 +58,7 @@ impl Desk {
     /// reads files, and nothing is locked meanwhile.
     pub fn take_call(
         &self,
-        from: From,
+        from: RequestId,
         text: &str,
         stops: u64,
         is_wanted: impl Fn() -> bool,
@@ -101,7 +101,9 @@ impl Desk {
             ControllerState::Manual if self.is_jog_ending() => return Err(NotTaken::NotYet),
             state => return Err(locked(state, "mdi")),
         }
-        if inner.books == Books::Written || !matches!(inner.order, None | Some(Order::Mdi)) {
+        if inner.state_write == StateWrite::UnderWay
+            || !matches!(inner.order, None | Some(Order::Mdi))
+        {
             return Err(NotTaken::NotYet);
         }
         if lines.are_jogs() && lines.is_at_work() {
@@ -125,7 +127,7 @@ impl Desk {
     }
 
     /// Judges a jog, words as of G1, and takes it: it is planned through into those that follow in time.
-    pub fn take_jog(&self, from: From, words: &str) -> Result<TakenLine, NotTaken> {
+    pub fn take_jog(&self, from: RequestId, words: &str) -> Result<TakenLine, NotTaken> {
         let mut inner = self.lock();
         match self.state_of(&inner) {
             ControllerState::Manual if self.is_jog_ending() => return Err(NotTaken::NotYet),
@@ -137,7 +139,9 @@ impl Desk {
             state => return Err(locked(state, "jog")),
         }
         let joins = matches!(inner.order, None | Some(Order::JogLines));
-        if inner.books == Books::Written || !joins && !matches!(inner.order, Some(Order::Mdi)) {
+        if inner.state_write == StateWrite::UnderWay
+            || !joins && !matches!(inner.order, Some(Order::Mdi))
+        {
             return Err(NotTaken::NotYet);
         }
         let mut lines = lock(&self.lines);

@@ -10,11 +10,10 @@ use tandem_rings::{MachineState, Rest, RestCause, Sample};
 use tandem_sdk::{AxisVector, Block, BlockReport, Curve, Event};
 use tandem_state::Driven;
 
-use super::desk::{Desk, Mode};
+use super::dispatcher::{Dispatcher, Mode};
 use super::lines::lock;
 use super::record::Recording;
-use super::script::Script;
-use super::serve::Tell;
+use super::script::{Script, Tell};
 use crate::jog::{JogController, JogInput, JogRest};
 
 /// Takes notes only.
@@ -26,9 +25,9 @@ impl RunObserver for Notes<'_> {
     }
 }
 
-/// Sees what a job does, for the desk; in lockstep it says what the script says.
+/// Sees what a job does, for the dispatcher; in lockstep it says what the script says.
 pub struct Watch<'a> {
-    desk: &'a Arc<Desk>,
+    dispatcher: &'a Arc<Dispatcher>,
     script: &'a mut Script,
     tell: Tell<'a>,
     mode: Mode,
@@ -57,7 +56,7 @@ pub struct Watch<'a> {
 
 impl<'a> Watch<'a> {
     pub fn new(
-        desk: &'a Arc<Desk>,
+        dispatcher: &'a Arc<Dispatcher>,
         script: &'a mut Script,
         tell: Tell<'a>,
         mode: Mode,
@@ -65,7 +64,7 @@ impl<'a> Watch<'a> {
         length_mm: f64,
     ) -> Self {
         Self {
-            desk,
+            dispatcher,
             script,
             tell,
             mode,
@@ -79,7 +78,7 @@ impl<'a> Watch<'a> {
             place: None,
             line: None,
             epoch: 0,
-            journal: desk.journal(),
+            journal: dispatcher.journal(),
             recording: None,
             tick: 0,
             ends: false,
@@ -93,10 +92,10 @@ impl RunObserver for Watch<'_> {
     }
 
     fn program_stop(&mut self, line: u32) -> StopAnswer {
-        let hub = &self.desk.hub;
+        let hub = &self.dispatcher.hub;
         if hub.waits_on_line().is_none() {
             hub.begin_wait(line);
-            self.desk
+            self.dispatcher
                 .send(None, &json!({ "event": "waits", "line": line }));
             return StopAnswer::Wait;
         }
@@ -113,10 +112,10 @@ impl RunObserver for Watch<'_> {
 
     fn rest(&mut self, rest: &Rest) {
         self.epoch = u64::from(rest.epoch) + 1;
-        self.desk.hub.end_wait();
+        self.dispatcher.hub.end_wait();
         if self.mode == Mode::Jog && rest.cause == RestCause::Abort {
             // It is let go; else it would be at every rest again.
-            let jog = &self.desk.hub.controls().jog;
+            let jog = &self.dispatcher.hub.controls().jog;
             jog.let_go.store(false, Relaxed);
         }
     }
@@ -127,7 +126,7 @@ impl RunObserver for Watch<'_> {
         }
         self.ends_of.push_back((block.index, block.end));
         if self.mode != Mode::Program {
-            self.desk.path().block(block, curve);
+            self.dispatcher.path().block(block, curve);
         }
     }
 
@@ -141,14 +140,14 @@ impl RunObserver for Watch<'_> {
         if let Some(recording) = &mut self.recording {
             recording.sample(sample, signals);
         }
-        self.driven_mm += sample.feed_mm_per_s * self.desk.machine.fine_period_s;
+        self.driven_mm += sample.feed_mm_per_s * self.dispatcher.machine.fine_period_s;
         let share = if self.length_mm > 0.0 {
             (self.driven_mm / self.length_mm).min(1.0)
         } else {
             0.0
         };
-        self.desk.hub.sample(sample, share);
-        self.desk.scope().sample(sample, signals);
+        self.dispatcher.hub.sample(sample, share);
+        self.dispatcher.scope().sample(sample, signals);
         self.place = Some(sample.command);
         if sample.line != 0 {
             self.line = Some(sample.line);
@@ -163,10 +162,11 @@ impl RunObserver for Watch<'_> {
                 self.ends_of.pop_front();
             }
         }
-        let mut seen = self.desk.seen();
+        let mut seen = self.dispatcher.seen();
         if is_next {
             let end = self.ends_of.front().filter(|(at, _)| *at == sample.block);
-            (seen.block, seen.end) = (sample.block, end.map(|(_, end)| *end));
+            seen.block = sample.block;
+            seen.end = end.map(|(_, end)| *end);
         }
         seen.switched = sample.switched;
         drop(seen);
@@ -177,8 +177,8 @@ impl RunObserver for Watch<'_> {
         let reaches = has_begun && self.reached != Some(sample.block);
         if reaches && matches!(self.mode, Mode::Program | Mode::Mdi) {
             self.reached = Some(sample.block);
-            let driven = lock(&self.desk.lines).reach(sample.block);
-            self.desk.tell_driven(&driven, true);
+            let driven = lock(&self.dispatcher.lines).reach(sample.block);
+            self.dispatcher.tell_driven(&driven, true);
         }
         self.block = Some(sample.block);
     }
@@ -191,15 +191,15 @@ impl RunObserver for Watch<'_> {
         if let Some(recording) = &mut self.recording {
             recording.period();
         }
-        if self.desk.is_over() && !self.ends && self.mode != Mode::Idle {
+        if self.dispatcher.is_over() && !self.ends && self.mode != Mode::Idle {
             self.ends = true;
-            self.desk.hub.controls().abort.store(true, Relaxed);
+            self.dispatcher.hub.controls().abort.store(true, Relaxed);
         }
         if let Some(place) = self.place.take() {
-            self.desk.path().drive(&place);
+            self.dispatcher.path().drive(&place);
         }
         if let (Some(line), Some((job, hash))) = (self.line.take(), &self.journal) {
-            self.desk.keeper.driven(Driven {
+            self.dispatcher.persistence.driven(Driven {
                 job: *job,
                 hash: hash.clone(),
                 line,
@@ -207,24 +207,25 @@ impl RunObserver for Watch<'_> {
             });
         }
         if self.mode != Mode::Idle {
-            self.desk.keep_reached();
+            self.dispatcher.keep_reached();
         }
-        self.desk.send_scope(false);
-        self.desk.tell_state();
+        self.dispatcher.send_scope(false);
+        self.dispatcher.tell_state();
         self.script
-            .flush(self.desk, self.tick, self.clock, self.tell);
+            .flush(self.dispatcher, self.tick, self.clock, self.tell);
     }
 
     fn before_tick(&mut self, uptime_periods: u64) {
         self.tick = uptime_periods;
-        let at_s = uptime_periods as f64 * self.desk.machine.fine_period_s;
-        self.desk.set_replay_time(at_s);
-        self.script.say_due(self.desk, uptime_periods, self.tell);
+        let at_s = uptime_periods as f64 * self.dispatcher.machine.fine_period_s;
+        self.dispatcher.set_replay_time(at_s);
+        self.script
+            .say_due(self.dispatcher, uptime_periods, self.tell);
     }
 }
 
 /// Tells everybody of jogs that could not begin.
-pub struct Refusals(pub Arc<Desk>);
+pub struct Refusals(pub Arc<Dispatcher>);
 
 impl JogInput for Refusals {
     fn period(&mut self, _jogs: &JogController) {}

@@ -92,7 +92,8 @@ const OF_JOGS: [u32; 5] = [20, 21, 53, 90, 91];
 /// What else stands there; `None` where it is the feed that is missing.
 pub fn check_jog(words: &str) -> Result<(), Option<String>> {
     let mut rest = words.trim_start();
-    let (mut feed, mut axis) = (false, false);
+    let mut feed = false;
+    let mut axis = false;
     while let Some(letter) = rest.chars().next() {
         let letter = letter.to_ascii_uppercase();
         let number = rest[letter.len_utf8()..].trim_start();

@@ -20,10 +20,10 @@ impl Sender {
             RealTime::Resume => self.resume(lease, now),
             RealTime::Reset => self.begin_reset(lease, now),
             RealTime::CancelJog => {
-                if self.desk.state() == ControllerState::Manual
-                    || self.desk.with_lines(|lines| lines.are_jogs())
+                if self.dispatcher.state() == ControllerState::Manual
+                    || self.dispatcher.with_lines(|lines| lines.are_jogs())
                 {
-                    self.desk.cancel_jogs();
+                    self.dispatcher.cancel_jogs();
                     self.forget_jogs();
                 }
             }
@@ -48,30 +48,32 @@ impl Sender {
 
     /// Stops are free for all.
     fn hold(&mut self, door: bool) {
-        if self.desk.mode() == Mode::Jog {
+        if self.dispatcher.mode() == Mode::Jog {
             // As grbl has it: a hold ends jogs.
-            self.desk.cancel_jogs();
+            self.dispatcher.cancel_jogs();
             self.forget_jogs();
             return;
         }
-        self.desk.hold();
-        (self.said.holds, self.said.door) = (true, door);
+        self.dispatcher.hold();
+        self.said.holds = true;
+        self.said.door = door;
     }
 
     fn resume(&mut self, lease: &mut Lease, now: Instant) {
-        if !self.desk.is_still() && !self.may(lease, now) {
+        if !self.dispatcher.is_still() && !self.may(lease, now) {
             return;
         }
-        if let Err(why) = self.desk.hub.give(Command::Resume) {
+        if let Err(why) = self.dispatcher.hub.give(Command::Resume) {
             self.message(&why);
             return;
         }
-        (self.said.holds, self.said.door) = (false, false);
+        self.said.holds = false;
+        self.said.door = false;
     }
 
     fn override_feed(&mut self, step: Step) {
-        let now = self.desk.hub.controls().feed_override.load() * 100.0;
-        let most = self.desk.hub.max_feed_ratio() * 100.0;
+        let now = self.dispatcher.hub.controls().feed_override.load() * 100.0;
+        let most = self.dispatcher.hub.max_feed_ratio() * 100.0;
         let asked = match step {
             Step::To(percent) => f64::from(percent),
             Step::By(percent) => (now + f64::from(percent)).round(),
@@ -86,7 +88,7 @@ impl Sender {
     }
 
     fn give(&mut self, command: Command) {
-        if let Err(why) = self.desk.hub.give(command) {
+        if let Err(why) = self.dispatcher.hub.give(command) {
             self.message(&why);
         }
     }
@@ -96,12 +98,12 @@ impl Sender {
         if !self.may(lease, now) {
             return;
         }
-        if !self.desk.is_still() {
+        if !self.dispatcher.is_still() {
             self.message("coolant is switched by M7, M8 and M9 while lines are driven");
             return;
         }
         let on = self
-            .desk
+            .dispatcher
             .with_lines(|lines| lines.standing().coolant_words());
         let line = if on.contains(&word) {
             let others: Vec<&str> = on.into_iter().filter(|other| *other != word).collect();

@@ -8,8 +8,8 @@ use tandem_machine::{Machine, Role};
 use tandem_rings::Status;
 use tandem_sdk::{Axes, AxisVector};
 
-use super::settings::Settings;
-use crate::controller::{ControllerState, Desk, Mode};
+use super::settings::{Settings, axes_shown};
+use crate::controller::{ControllerState, Dispatcher, Mode};
 
 /// Reports between two that have the offset, or the overrides, at rest and in motion, as grbl has them.
 const REFRESHES: [u32; 2] = [10, 30];
@@ -72,12 +72,12 @@ pub struct Said {
 }
 
 /// What the machine does, in grbl's words.
-pub fn state_of(desk: &Desk, said: Said) -> GrblState {
-    let rests = !desk.moves();
+pub fn state_of(dispatcher: &Dispatcher, said: Said) -> GrblState {
+    let rests = !dispatcher.moves();
     let held = |rests| {
         let has_door = |role: Option<Role>| role == Some(Role::Door);
-        let tripped = desk.loop_status().tripped.load(Relaxed);
-        let open = desk
+        let tripped = dispatcher.loop_status().tripped.load(Relaxed);
+        let open = dispatcher
             .machine
             .inputs
             .iter()
@@ -88,17 +88,17 @@ pub fn state_of(desk: &Desk, said: Said) -> GrblState {
             GrblState::Hold { rests }
         }
     };
-    match desk.state() {
+    match dispatcher.state() {
         ControllerState::Disabled if said.asleep => GrblState::Sleep,
         ControllerState::EmergencyStop | ControllerState::Fault | ControllerState::Disabled => {
             GrblState::Alarm
         }
         ControllerState::HomingNeeded if !said.unlocked => GrblState::Alarm,
         ControllerState::Ready | ControllerState::HomingNeeded => {
-            let works = !desk.is_still();
+            let works = !dispatcher.is_still();
             if said.holds {
                 held(true)
-            } else if works && desk.with_lines(|lines| lines.are_jogs()) {
+            } else if works && dispatcher.with_lines(|lines| lines.are_jogs()) {
                 GrblState::Jog
             } else if works {
                 GrblState::Run
@@ -109,25 +109,16 @@ pub fn state_of(desk: &Desk, said: Said) -> GrblState {
             }
         }
         ControllerState::Manual => GrblState::Jog,
-        ControllerState::Running if desk.mode() == Mode::Homing => GrblState::Home,
+        ControllerState::Running if dispatcher.mode() == Mode::Homing => GrblState::Home,
         ControllerState::Running | ControllerState::Mdi => GrblState::Run,
         ControllerState::Held => held(rests),
-        ControllerState::Stopping => match desk.mode() {
+        ControllerState::Stopping => match dispatcher.mode() {
             Mode::Enabling | Mode::Idle => GrblState::Alarm,
             Mode::Jog => GrblState::Jog,
-            _ if desk.fault_words().is_some() => GrblState::Alarm,
+            _ if dispatcher.fault_words().is_some() => GrblState::Alarm,
             _ => GrblState::Hold { rests: false },
         },
     }
-}
-
-/// The axes in the order in which senders expect them: X Y Z, whether the machine has them or not, and the others behind them.
-pub fn axes_shown(axes: &Axes) -> Vec<Option<usize>> {
-    let first = "XYZ".chars().map(|letter| axes.index(letter));
-    let others = (0..axes.count())
-        .filter(|axis| !"XYZ".contains(axes.letter(*axis)))
-        .map(Some);
-    first.chain(others).collect()
 }
 
 /// A place or an offset as senders read it: mm or inches, and degrees.
@@ -194,15 +185,22 @@ impl Reports {
     }
 
     /// One status report.
-    pub fn next(&mut self, desk: &Desk, settings: &Settings, said: Said, free: Free) -> String {
-        let state = state_of(desk, said);
-        let (axes, inches) = (&desk.machine.axes, settings.inches());
-        let machine = desk.hub.position();
-        let (work, words) = desk.with_lines(|lines| {
+    pub fn next(
+        &mut self,
+        dispatcher: &Dispatcher,
+        settings: &Settings,
+        said: Said,
+        free: Free,
+    ) -> String {
+        let state = state_of(dispatcher, said);
+        let axes = &dispatcher.machine.axes;
+        let inches = settings.inches();
+        let machine = dispatcher.hub.position();
+        let (work, words) = dispatcher.with_lines(|lines| {
             let standing = lines.standing();
             (standing.to_program(&machine), accessories(standing))
         });
-        let status = desk.loop_status();
+        let status = dispatcher.loop_status();
         let mut text = format!("<{}|", state.word());
         // A string takes whatever is written to it.
         let _ = if settings.has_machine_position() {
@@ -221,11 +219,11 @@ impl Reports {
         };
         let rpm = status.spindle.told_rad_per_s.load().abs() * 30.0 / std::f64::consts::PI;
         let _ = write!(text, "|FS:{feed_per_min:.0},{rpm:.0}");
-        let pins = pins(&desk.machine, status);
+        let pins = pins(&dispatcher.machine, status);
         if !pins.is_empty() {
             let _ = write!(text, "|Pn:{pins}");
         }
-        let controls = desk.hub.controls();
+        let controls = dispatcher.hub.controls();
         let percent = |ratio: f64| (ratio * 100.0).round();
         let overrides = format!(
             "Ov:{},{},100",
@@ -346,9 +344,10 @@ pub fn modes(ahead: &Interpreter, inches: bool) -> String {
 }
 
 /// `$#`: offsets, and what the last probe found.
-pub fn offsets(desk: &Desk, inches: bool) -> String {
-    let axes = &desk.machine.axes;
-    let (lasting, probed) = desk.with_lines(|lines| (lines.ahead().lasting(), lines.probed()));
+pub fn offsets(dispatcher: &Dispatcher, inches: bool) -> String {
+    let axes = &dispatcher.machine.axes;
+    let (lasting, probed) =
+        dispatcher.with_lines(|lines| (lines.ahead().lasting(), lines.probed()));
     let mut text = String::new();
     let mut line = |name: &str, of: &AxisVector, more: &str| {
         let _ = write!(text, "[{name}:{}{more}]\r\n", vector(axes, of, inches));

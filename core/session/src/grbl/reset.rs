@@ -7,7 +7,7 @@ use tandem_host::Command;
 use super::errors::alarm_of;
 use super::report::{GrblState, state_of};
 use super::sender::{Pending, Sender};
-use crate::controller::{ControllerState, From, Lines, Mode, NotTaken};
+use crate::controller::{ControllerState, Lines, Mode, NotTaken, RequestId};
 use crate::operator::Lease;
 
 impl Sender {
@@ -22,35 +22,35 @@ impl Sender {
         self.said.unlocked = false;
         self.check = None;
         let others = lease.holder().is_some_and(|holder| holder != self.client);
-        let foreign = others && !self.desk.is_still();
+        let foreign = others && !self.dispatcher.is_still();
         if foreign {
             self.greet();
             let who = lease.name_of(lease.holder().unwrap_or_default());
             self.message(&format!("{who} drives the machine: it goes on"));
             return;
         }
-        if !self.desk.is_still() {
+        if !self.dispatcher.is_still() {
             // It is nobody's, or ours.
             let _ = lease.take(self.client, now);
-            self.desk.stop();
+            self.dispatcher.stop();
         }
         self.resetting = true;
     }
 
     /// Once the machine rests: spindle and coolant off, modes as at the start.
     pub(super) fn end_reset(&mut self, lease: &Lease) {
-        if !self.resetting || !self.desk.is_still() {
+        if !self.resetting || !self.dispatcher.is_still() {
             return;
         }
         self.resetting = false;
         let others = lease.holder().is_some_and(|holder| holder != self.client);
         if !others {
-            self.desk.with_lines(Lines::reset_modes);
+            self.dispatcher.with_lines(Lines::reset_modes);
             for command in [Command::FeedOverride(1.0), Command::RapidOverride(1.0)] {
                 // One is always allowed.
-                let _ = self.desk.hub.give(command);
+                let _ = self.dispatcher.hub.give(command);
             }
-            let runs = self.desk.with_lines(|lines| {
+            let runs = self.dispatcher.with_lines(|lines| {
                 let standing = lines.standing();
                 let turns = !standing.modal_words().iter().any(|word| word == "M5");
                 turns || !standing.coolant_words().is_empty()
@@ -66,14 +66,14 @@ impl Sender {
     pub(super) fn greet(&mut self) {
         self.reports.renew();
         self.say("\r\nGrbl 1.1h ['$' for help]\r\n");
-        if state_of(&self.desk, self.said) == GrblState::Alarm {
+        if state_of(&self.dispatcher, self.said) == GrblState::Alarm {
             self.message("'$H'|'$X' to unlock");
         }
     }
 
     /// Tells of a fault, once.
     pub(super) fn look_for_fault(&mut self) {
-        let words = self.desk.fault_words();
+        let words = self.dispatcher.fault_words();
         if words == self.fault {
             return;
         }
@@ -92,10 +92,10 @@ impl Sender {
 
     /// A line of ours that nobody waits for.
     pub(super) fn of_our_own(&mut self, line: &str) -> Result<(), String> {
-        if self.desk.state() != ControllerState::Ready {
+        if self.dispatcher.state() != ControllerState::Ready {
             return Err(format!("{line} is for a machine that is ready"));
         }
-        match self.desk.take_line(From::nobody(), line) {
+        match self.dispatcher.take_line(RequestId::nobody(), line) {
             Ok(_) => Ok(()),
             Err(NotTaken::Refused(why)) => Err(why.cause),
             Err(NotTaken::Locked(why)) => Err(why),

@@ -135,7 +135,8 @@ impl Scanner {
                     bytes: self.bytes + 1,
                     too_long: self.too_long,
                 };
-                (self.bytes, self.too_long) = (0, false);
+                self.bytes = 0;
+                self.too_long = false;
                 Some(Heard::Line(line))
             }
             0xc2 => None,

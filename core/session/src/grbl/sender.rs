@@ -14,10 +14,10 @@ use super::report::{self, Free, Reports, Said};
 use super::scan::{Heard, Scanner, SentLine};
 use super::settings::Settings;
 use crate::controller::{
-    Asked, Clerk, ControllerState, Desk, From, Mode, NotTaken, PLACES, TakenLine,
+    Asked, ControllerState, DiskWork, Dispatcher, Mode, NotTaken, PLACES, RequestId, TakenLine,
 };
 use crate::judge::Refusal;
-use crate::operator::{Answer, Lease, Look, News, Problem, Talk};
+use crate::operator::{Answer, Lease, News, Problem, Protocol, StatusText};
 
 /// Bytes that are kept of a sender that does not wait for answers; more of them wait with the system.
 const MAX_KEPT_BYTES: usize = 64 * 1024;
@@ -31,7 +31,7 @@ const GREET_AFTER: Duration = Duration::from_millis(300);
 /// A line that calls a subroutine: its file is read by a thread that may wait for it.
 pub(super) enum Called {
     /// It is to be driven.
-    Driven(From, SentLine, Later<Result<TakenLine, NotTaken>>),
+    Driven(RequestId, SentLine, Later<Result<TakenLine, NotTaken>>),
     /// It is checked.
     Checked(Later<Result<Interpreter, Refusal>>),
 }
@@ -56,7 +56,7 @@ pub(super) enum Pending {
 
 /// A sender of grbl's protocol.
 pub struct Sender {
-    pub(super) desk: Arc<Desk>,
+    pub(super) dispatcher: Arc<Dispatcher>,
     pub(super) client: u64,
     place: String,
     settings: Arc<Settings>,
@@ -68,7 +68,7 @@ pub struct Sender {
     next_id: u64,
     pub(super) pending: Option<Pending>,
     /// Waits for disks; none where everything is done in lockstep.
-    clerk: Option<Clerk>,
+    disk: Option<DiskWork>,
     pub(super) called: Option<Called>,
     pub(super) said: Said,
     /// The lines of check mode, as far as they have come.
@@ -85,10 +85,15 @@ pub struct Sender {
 
 impl Sender {
     /// Somebody has come in at `place`.
-    pub fn new(desk: Arc<Desk>, settings: Arc<Settings>, client: u64, place: &str) -> Self {
-        let fault = desk.fault_words();
+    pub fn new(
+        dispatcher: Arc<Dispatcher>,
+        settings: Arc<Settings>,
+        client: u64,
+        place: &str,
+    ) -> Self {
+        let fault = dispatcher.fault_words();
         Self {
-            desk,
+            dispatcher,
             client,
             place: place.to_string(),
             settings,
@@ -98,7 +103,7 @@ impl Sender {
             pending_bytes: 0,
             next_id: 1,
             pending: None,
-            clerk: None,
+            disk: None,
             called: None,
             said: Said::default(),
             check: None,
@@ -113,8 +118,8 @@ impl Sender {
     }
 
     /// One for which threads of its own wait for disks.
-    pub fn with_clerk(mut self) -> Self {
-        self.clerk = Some(Clerk::new(Arc::clone(&self.desk)));
+    pub fn with_disk_work(mut self) -> Self {
+        self.disk = Some(DiskWork::new(Arc::clone(&self.dispatcher)));
         self
     }
 
@@ -158,14 +163,14 @@ impl Sender {
         let free = Free {
             lines: PLACES
                 - self
-                    .desk
+                    .dispatcher
                     .with_lines(|lines| lines.count_waiting())
                     .min(PLACES),
             bytes: RX_BYTES.saturating_sub(self.bytes + self.scanner.bytes()),
         };
         let report = self
             .reports
-            .next(&self.desk, &self.settings, self.said, free);
+            .next(&self.dispatcher, &self.settings, self.said, free);
         self.say(&report);
     }
 
@@ -250,12 +255,12 @@ impl Sender {
                 self.say("[HLP:$$ $# $G $I $N $x=val $Nx=line $J=line $SLP $C $X $H ~ ! ? ctrl-x]\r\nok\r\n");
             }
             Asks::Settings => {
-                let list = self.settings.list(&self.desk.machine);
+                let list = self.settings.list(&self.dispatcher.machine);
                 self.say(&list);
                 self.say("ok\r\n");
             }
             Asks::Set(number, value) => {
-                match self.settings.set(&self.desk.machine, number, value) {
+                match self.settings.set(&self.dispatcher.machine, number, value) {
                     Ok(()) => {
                         self.reports.renew();
                         self.say("ok\r\n");
@@ -264,7 +269,7 @@ impl Sender {
                 }
             }
             Asks::Offsets => {
-                let offsets = report::offsets(&self.desk, self.settings.inches());
+                let offsets = report::offsets(&self.dispatcher, self.settings.inches());
                 self.say(&offsets);
                 self.say("ok\r\n");
             }
@@ -273,14 +278,14 @@ impl Sender {
                 let modes = match &self.check {
                     Some(check) => report::modes(check, inches),
                     None => self
-                        .desk
+                        .dispatcher
                         .with_lines(|lines| report::modes(lines.ahead(), inches)),
                 };
                 self.say(&modes);
                 self.say("ok\r\n");
             }
             Asks::Build => {
-                let build = report::build(&self.desk.machine, PLACES, RX_BYTES);
+                let build = report::build(&self.dispatcher.machine, PLACES, RX_BYTES);
                 self.say(&build);
                 self.say("ok\r\n");
             }
@@ -300,9 +305,9 @@ impl Sender {
         true
     }
 
-    fn id(&mut self) -> From {
+    fn id(&mut self) -> RequestId {
         self.next_id += 1;
-        From {
+        RequestId {
             client: self.client,
             id: self.next_id,
         }
@@ -315,13 +320,15 @@ impl Sender {
         }
         let from = self.id();
         self.idle_since = None;
-        if let Some(clerk) = self.clerk.as_ref().filter(|_| self.desk.calls(text)) {
-            let (later, text, stops) = (Later::default(), text.to_string(), self.desk.stops());
+        if let Some(disk) = self.disk.as_ref().filter(|_| self.dispatcher.calls(text)) {
+            let later = Later::default();
+            let text = text.to_string();
+            let stops = self.dispatcher.stops();
             let found = Arc::clone(&later);
-            let begun = clerk.give(move |desk| {
+            let begun = disk.give(move |dispatcher| {
                 // A reset of the sender leaves it to this thread alone.
                 let is_wanted = || Arc::strong_count(&found) > 1;
-                let taken = desk.take_call(from, &text, stops, is_wanted);
+                let taken = dispatcher.take_call(from, &text, stops, is_wanted);
                 *found.lock().unwrap_or_else(PoisonError::into_inner) = Some(taken);
             });
             if begun {
@@ -330,12 +337,12 @@ impl Sender {
             // Without a thread it is said again.
             return begun;
         }
-        let taken = self.desk.take_line(from, text);
+        let taken = self.dispatcher.take_line(from, text);
         self.settle_taken(from, taken)
     }
 
     /// `false` where the line is to be said again.
-    fn settle_taken(&mut self, from: From, taken: Result<TakenLine, NotTaken>) -> bool {
+    fn settle_taken(&mut self, from: RequestId, taken: Result<TakenLine, NotTaken>) -> bool {
         match taken {
             Ok(TakenLine { rests: false, .. }) => self.say("ok\r\n"),
             Ok(TakenLine {
@@ -355,7 +362,7 @@ impl Sender {
     /// What a thread has found.
     fn settle_call(&mut self) {
         // Looked at first: what is found lies there before the thread has ended.
-        let reads = self.clerk.as_ref().is_some_and(Clerk::is_busy);
+        let reads = self.disk.as_ref().is_some_and(DiskWork::is_busy);
         match self.called.take() {
             Some(Called::Driven(from, line, later)) => match take(&later) {
                 Some(taken) => {
@@ -406,14 +413,14 @@ impl Sender {
             return true;
         }
         let needs_unlock =
-            self.desk.state() == ControllerState::HomingNeeded && !self.said.unlocked;
+            self.dispatcher.state() == ControllerState::HomingNeeded && !self.said.unlocked;
         if needs_unlock {
             self.refuse(ErrorNumber::LOCKED, "'$H'|'$X' to unlock");
             return true;
         }
         let from = self.id();
         self.idle_since = None;
-        match self.desk.take_jog(from, words) {
+        match self.dispatcher.take_jog(from, words) {
             Ok(_) => self.say("ok\r\n"),
             Err(why) => return self.not_taken(why),
         }
@@ -425,7 +432,7 @@ impl Sender {
         match why {
             NotTaken::NotYet => return false,
             NotTaken::Locked(why) => {
-                let fault = self.desk.fault_words();
+                let fault = self.dispatcher.fault_words();
                 self.refuse(ErrorNumber::LOCKED, fault.as_ref().unwrap_or(&why));
             }
             NotTaken::NotIdle => self.refuse(
@@ -441,14 +448,14 @@ impl Sender {
         let Some(check) = self.check.clone() else {
             return;
         };
-        let Some(clerk) = self.clerk.as_ref().filter(|_| self.desk.calls(text)) else {
-            let checked = self.desk.with_lines(|lines| lines.check(&check, text));
+        let Some(disk) = self.disk.as_ref().filter(|_| self.dispatcher.calls(text)) else {
+            let checked = self.dispatcher.with_lines(|l| l.check(&check, text));
             return self.settle_check(checked);
         };
         let (later, text) = (Later::default(), text.to_string());
         let found = Arc::clone(&later);
-        let begun = clerk.give(move |desk| {
-            let checked = desk.check_call(&check, &text);
+        let begun = disk.give(move |dispatcher| {
+            let checked = dispatcher.check_call(&check, &text);
             *found.lock().unwrap_or_else(PoisonError::into_inner) = Some(checked);
         });
         if begun {
@@ -476,8 +483,8 @@ impl Sender {
             self.message("Disabled");
             self.say("ok\r\n");
             self.resetting = true;
-        } else if self.desk.state() == ControllerState::Ready && self.desk.is_still() {
-            self.check = Some(self.desk.standing());
+        } else if self.dispatcher.state() == ControllerState::Ready && self.dispatcher.is_still() {
+            self.check = Some(self.dispatcher.standing());
             self.said.checks = true;
             self.message("Enabled");
             self.say("ok\r\n");
@@ -490,7 +497,7 @@ impl Sender {
     }
 
     fn unlock(&mut self, lease: &mut Lease, now: Instant) -> bool {
-        let request = match self.desk.state() {
+        let request = match self.dispatcher.state() {
             ControllerState::EmergencyStop | ControllerState::Fault => "reset",
             ControllerState::Disabled => "enable",
             ControllerState::Stopping => return false,
@@ -514,17 +521,17 @@ impl Sender {
     }
 
     fn home(&mut self, axis: Option<char>, lease: &mut Lease, now: Instant) -> bool {
-        if self.desk.machine.homing.is_empty() {
+        if self.dispatcher.machine.homing.is_empty() {
             self.refuse(
                 ErrorNumber::HOMING_OFF,
                 "this machine needs no homing: its drives know where they stand",
             );
             return true;
         }
-        if self.desk.state() == ControllerState::Stopping {
+        if self.dispatcher.state() == ControllerState::Stopping {
             return false;
         }
-        if !self.desk.is_still() {
+        if !self.dispatcher.is_still() {
             self.refuse(
                 ErrorNumber::NOT_IDLE,
                 "homing begins where the machine stands",
@@ -539,7 +546,7 @@ impl Sender {
     }
 
     fn sleep(&mut self, lease: &mut Lease, now: Instant) -> bool {
-        if !self.desk.is_still() {
+        if !self.dispatcher.is_still() {
             self.refuse(
                 ErrorNumber::NOT_IDLE,
                 "sleep begins where the machine stands",
@@ -570,7 +577,7 @@ impl Sender {
             request: request.to_string(),
             with,
         };
-        match self.desk.ask(from, &asked) {
+        match self.dispatcher.ask(from, &asked) {
             None => self.pending = Some(pending(from.id)),
             Some(Ok(_)) => self.say("ok\r\n"),
             Some(Err(why)) => self.refuse(ErrorNumber::LOCKED, &why),
@@ -579,11 +586,11 @@ impl Sender {
     }
 
     pub(super) fn tell_probe(&mut self) {
-        let Some(probed) = self.desk.with_lines(|lines| lines.probed()) else {
+        let Some(probed) = self.dispatcher.with_lines(|lines| lines.probed()) else {
             return;
         };
         let place = report::vector(
-            &self.desk.machine.axes,
+            &self.dispatcher.machine.axes,
             &probed.position,
             self.settings.inches(),
         );
@@ -625,7 +632,7 @@ impl Sender {
         }
     }
 
-    /// News of the desk.
+    /// Something has changed.
     fn hear_news(&mut self, news: &Value) {
         let id = news["id"].as_u64();
         let is_ours = |of: u64| id == Some(of);
@@ -670,7 +677,7 @@ impl Sender {
     /// The machine is let go of where it has had nothing to do for a while.
     fn let_go(&mut self, lease: &mut Lease, now: Instant) {
         let waits = self.pending.is_some() || self.called.is_some();
-        let busy = !self.lines.is_empty() || waits || !self.desk.is_still();
+        let busy = !self.lines.is_empty() || waits || !self.dispatcher.is_still();
         if busy || !lease.is_held_by(self.client) {
             self.idle_since = None;
         } else if now.duration_since(*self.idle_since.get_or_insert(now)) >= KEPT_FOR {
@@ -684,7 +691,7 @@ impl Sender {
     }
 }
 
-impl Talk for Sender {
+impl Protocol for Sender {
     fn client(&self) -> u64 {
         self.client
     }
@@ -708,7 +715,7 @@ impl Talk for Sender {
     }
 
     fn bytes(&mut self, bytes: &[u8], lease: &mut Lease, now: Instant) -> Answer {
-        self.desk.note(|all| all.bytes(self.client, bytes));
+        self.dispatcher.note(|all| all.bytes(self.client, bytes));
         for byte in bytes {
             self.hear(*byte, lease, now);
         }
@@ -725,7 +732,7 @@ impl Talk for Sender {
             self.greet();
         }
         self.look_for_fault();
-        let mode = self.desk.mode();
+        let mode = self.dispatcher.mode();
         if mode != Mode::Idle {
             self.last_mode = mode;
         }
@@ -772,7 +779,7 @@ impl Talk for Sender {
         [soon, self.greet_at].into_iter().flatten().min()
     }
 
-    fn telemetry(&mut self, _lost: u64, _look: &mut Look) -> String {
+    fn telemetry(&mut self, _lost: u64, _look: &mut StatusText) -> String {
         String::new()
     }
 
@@ -790,6 +797,6 @@ impl Talk for Sender {
 
 impl Drop for Sender {
     fn drop(&mut self) {
-        self.desk.note(|all| all.leaves(self.client));
+        self.dispatcher.note(|all| all.leaves(self.client));
     }
 }

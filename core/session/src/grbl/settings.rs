@@ -5,6 +5,7 @@ use std::sync::atomic::Ordering::Relaxed;
 use std::sync::atomic::{AtomicBool, AtomicU8};
 
 use tandem_machine::Machine;
+use tandem_sdk::Axes;
 
 /// Bit of `$10`: machine positions instead of work positions.
 const MACHINE_POSITION: u8 = 1;
@@ -88,7 +89,7 @@ impl Settings {
         }
         line(32, 0.0);
         let limits = machine.limits.axes();
-        let axes = super::report::axes_shown(&machine.axes);
+        let axes = axes_shown(&machine.axes);
         let each = |of: &dyn Fn(usize) -> f64| -> Vec<f64> {
             axes.iter()
                 .map(|axis| axis.map_or(0.0, |axis| of(axis) * per(machine, axis)))
@@ -123,4 +124,13 @@ fn shown(value: f64) -> String {
     } else {
         format!("{value:.3}")
     }
+}
+
+/// The axes in the order in which senders expect them: X Y Z, whether the machine has them or not, and the others behind them.
+pub fn axes_shown(axes: &Axes) -> Vec<Option<usize>> {
+    let first = "XYZ".chars().map(|letter| axes.index(letter));
+    let others = (0..axes.count())
+        .filter(|axis| !"XYZ".contains(axes.letter(*axis)))
+        .map(Some);
+    first.chain(others).collect()
 }

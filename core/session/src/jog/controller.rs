@@ -314,7 +314,9 @@ impl JogController {
     /// Where a jog from `start` ends.
     fn target(&self, jog: &Jog, start: &AxisVector) -> Result<AxisVector, String> {
         let limits = &self.machine.limits.axes()[jog.axis];
-        let (low, high, at) = (limits.min_mm, limits.max_mm, start[jog.axis]);
+        let low = limits.min_mm;
+        let high = limits.max_mm;
+        let at = start[jog.axis];
         let name = self.name(jog.axis);
         let end = match jog.reach {
             Reach::On { positive: true } => high,

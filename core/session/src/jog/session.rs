@@ -11,7 +11,7 @@ use tandem_sdk::AxisVector;
 
 use super::controller::JogController;
 use super::message::JogRest;
-use crate::standing::Standing;
+use crate::standstill::Standstill;
 
 /// The operator's side of a session. Called on the soft side.
 pub trait JogInput: Send {
@@ -77,10 +77,11 @@ impl<'a> JogSession<'a> {
         let source = Jogging {
             jogs: Arc::clone(&self.jogs),
             input: Arc::clone(&self.input),
-            standing: Standing::default(),
+            standing: Standstill::default(),
             stays: true,
         };
-        let (machine, name) = (self.machine.clone(), "jogging".to_string());
+        let machine = self.machine.clone();
+        let name = "jogging".to_string();
         let run = Run::of_source(
             machine,
             self.registry,
@@ -120,7 +121,7 @@ impl<'a> JogSession<'a> {
 pub struct Jogging {
     jogs: Arc<JogController>,
     input: SharedInput,
-    standing: Standing,
+    standing: Standstill,
     /// It waits for jogs to come; else it is over when none moves.
     stays: bool,
 }
@@ -131,7 +132,7 @@ impl Jogging {
         Self {
             jogs: Arc::clone(jogs),
             input: Arc::new(Mutex::new(input)),
-            standing: Standing::default(),
+            standing: Standstill::default(),
             stays: false,
         }
     }

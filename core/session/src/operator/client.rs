@@ -5,12 +5,12 @@ use std::time::{Duration, Instant};
 
 use rustix::event::PollFlags;
 
-use super::house::{Look, Talk};
 use super::lease::Lease;
-use super::listen::Stream;
 use super::outbox::Outbox;
 use super::reply::Problem;
+use super::service::{Protocol, StatusText};
 use super::session::Answer;
+use super::stream::Stream;
 
 /// Bytes that are read of a client at a time.
 const CHUNK: usize = 4096;
@@ -23,7 +23,7 @@ const TOKEN_WITHIN: Duration = Duration::from_secs(2);
 
 /// Who a client is, as far as that is known: each kind has places of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Standing {
+pub enum ClientKind {
     /// Runs as the same user as this program, or as root, or has named the token.
     Owner,
     /// Another user, let in by the mode of the socket's file.
@@ -35,8 +35,8 @@ pub enum Standing {
 /// One client.
 pub struct Client {
     stream: Box<dyn Stream>,
-    /// The door it came through.
-    pub door: usize,
+    /// The listener it came through.
+    pub listener: usize,
     is_guest: bool,
     incoming: Vec<u8>,
     /// So many bytes of it hold no end of a line.
@@ -47,7 +47,7 @@ pub struct Client {
     is_quiet: bool,
     hearing: Hearing,
     outbox: Outbox,
-    session: Box<dyn Talk>,
+    session: Box<dyn Protocol>,
     phase: Phase,
     /// Since when it is in its phase.
     since: Instant,
@@ -78,8 +78,8 @@ impl Client {
     pub fn new(
         stream: Box<dyn Stream>,
         is_guest: bool,
-        session: Box<dyn Talk>,
-        door: usize,
+        session: Box<dyn Protocol>,
+        listener: usize,
         now: Instant,
     ) -> Self {
         let mut outbox = Outbox::default();
@@ -89,7 +89,7 @@ impl Client {
         }
         Self {
             stream,
-            door,
+            listener,
             is_guest,
             incoming: vec![],
             looked_at: 0,
@@ -104,11 +104,11 @@ impl Client {
     }
 
     /// Who it is.
-    pub fn standing(&self) -> Standing {
+    pub fn kind(&self) -> ClientKind {
         match (self.is_guest, self.session.is_known()) {
-            (true, _) => Standing::Guest,
-            (false, true) => Standing::Owner,
-            (false, false) => Standing::Stranger,
+            (true, _) => ClientKind::Guest,
+            (false, true) => ClientKind::Owner,
+            (false, false) => ClientKind::Stranger,
         }
     }
 
@@ -164,7 +164,7 @@ impl Client {
     }
 
     /// Reads, answers, sends: whatever can be done without waiting. A stranger that names the token becomes an owner
-    /// where its door `has_place` for one.
+    /// where its listener `has_place` for one.
     pub fn serve(&mut self, lease: &mut Lease, has_place: bool, now: Instant) {
         self.session.set_has_place(has_place);
         self.read(lease, now);
@@ -187,7 +187,7 @@ impl Client {
     }
 
     /// Sends the status line that is due, if one is; whether one was.
-    pub fn show_status(&mut self, look: &mut Look, now: Instant) -> bool {
+    pub fn show_status(&mut self, look: &mut StatusText, now: Instant) -> bool {
         let is_due = self.phase == Phase::Talking && self.session.is_due(now);
         if is_due {
             self.outbox
@@ -233,7 +233,7 @@ impl Client {
         self.tell(&line, now);
     }
 
-    /// Post of the house.
+    /// A line that the client has not asked for.
     pub fn post(&mut self, line: &str, now: Instant) {
         let line = self.session.told(line);
         if !line.is_empty() {

@@ -170,7 +170,8 @@ impl OperatorHub {
         latest.waits_for_reset = false;
         latest.ended = false;
         latest.rests = true;
-        (latest.progress, latest.sigma) = (0.0, 1.0);
+        latest.progress = 0.0;
+        latest.sigma = 1.0;
         drop(latest);
         self.go_on.store(false, Release);
     }
@@ -178,7 +179,8 @@ impl OperatorHub {
     /// The machine stands at `position`, mm or rad, though no sample says so. Host.
     pub fn stands_at(&self, position: &AxisVector) {
         let mut latest = self.latest();
-        (latest.position, latest.rests) = (*position, true);
+        latest.position = *position;
+        latest.rests = true;
     }
 
     /// Where the machine is by the last sample, mm or rad.
@@ -189,7 +191,8 @@ impl OperatorHub {
     /// The session stands in `fault`: from now on a reset is taken. Host.
     pub fn begin_fault(&self, fault: &str) {
         let mut latest = self.latest();
-        (latest.fault, latest.waits_for_reset) = (Some(fault.to_string()), true);
+        latest.fault = Some(fault.to_string());
+        latest.waits_for_reset = true;
     }
 
     /// Whether somebody has taken back the fault that the session stands in. Host.
@@ -286,8 +289,10 @@ impl OperatorHub {
     /// The run is over: by a `fault`, `stopped` by the operator, or because all is done. Host.
     pub fn end(&self, fault: Option<&str>, stopped: Option<&str>) {
         let mut latest = self.latest();
-        (latest.fault, latest.stopped) = (fault.map(str::to_string), stopped.map(str::to_string));
-        (latest.ended, latest.waits_for_reset) = (true, false);
+        latest.fault = fault.map(str::to_string);
+        latest.stopped = stopped.map(str::to_string);
+        latest.ended = true;
+        latest.waits_for_reset = false;
     }
 
     /// Clients that could give commands over a socket now.
@@ -301,7 +306,8 @@ impl OperatorHub {
 
     /// The machine as it is now, for looking at. Allocates.
     pub fn status(&self) -> StatusLine {
-        let (status, controls) = (&self.status, &self.controls);
+        let status = &self.status;
+        let controls = &self.controls;
         let latest = self.latest();
         let state = MachineState::from_number(status.state.load(Relaxed));
         StatusLine {

@@ -54,7 +54,8 @@ impl Lease {
         if let Some(other) = self.holder.filter(|holder| *holder != client) {
             self.news.push((other, News::LostTo(client)));
         }
-        (self.holder, self.answer_by) = (Some(client), None);
+        self.holder = Some(client);
+        self.answer_by = None;
     }
 
     /// `client` has said something: it is there.
@@ -68,7 +69,8 @@ impl Lease {
     pub fn release(&mut self, client: u64) -> bool {
         let held = self.is_held_by(client);
         if held {
-            (self.holder, self.answer_by) = (None, None);
+            self.holder = None;
+            self.answer_by = None;
         }
         held
     }

@@ -1,15 +1,16 @@
 //! Where clients can reach a run.
 
-use std::io::{self, Read, Write};
+use std::io;
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::os::fd::{AsFd, BorrowedFd};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::pty::PtyDoor;
+use super::pty::PtyListener;
 use super::role::Role;
 use super::socket_file::{self, SocketFile};
+use super::stream::Stream;
 use super::token::Tokens;
 
 /// Bytes that the system keeps for a client: telemetry that waits longer is old.
@@ -42,17 +43,8 @@ impl Listen {
     }
 }
 
-/// A client's end, whichever way it came. Reading and writing never wait.
-pub trait Stream: Read + Write + Send {
-    /// For waiting until it is ready.
-    fn fd(&self) -> BorrowedFd<'_>;
-
-    /// Nothing more will be written. What fails here is broken anyway.
-    fn end_writing(&self);
-}
-
 /// A client that has just come.
-pub struct Comer {
+pub struct Connection {
     /// Its end.
     pub stream: Box<dyn Stream>,
     /// The tokens of which its first line must name one.
@@ -63,26 +55,9 @@ pub struct Comer {
     pub sender_at: Option<String>,
 }
 
-macro_rules! stream {
-    ($kind:ty) => {
-        impl Stream for $kind {
-            fn fd(&self) -> BorrowedFd<'_> {
-                self.as_fd()
-            }
-
-            fn end_writing(&self) {
-                let _ = self.shutdown(std::net::Shutdown::Write);
-            }
-        }
-    };
-}
-
-stream!(UnixStream);
-stream!(TcpStream);
-
-/// An open door.
+/// A place where clients are accepted.
 #[derive(Debug)]
-pub enum Door {
+pub enum Listener {
     /// The file's mode lets the owner in alone.
     Unix(
         UnixListener,
@@ -93,44 +68,44 @@ pub enum Door {
     /// Senders of grbl's protocol, from this computer.
     GrblTcp(TcpListener),
     /// Senders of grbl's protocol that open a terminal whose mode lets the owner in alone.
-    GrblPty(PtyDoor),
+    GrblPty(PtyListener),
 }
 
-impl Door {
-    /// Opens every door asked for.
+impl Listener {
+    /// Opens every listener asked for.
     ///
     /// # Errors
     /// The place with the cause.
     pub fn open(listen: &Listen) -> Result<Vec<Self>, String> {
-        let mut doors = vec![];
+        let mut listeners = vec![];
         if let Some(path) = &listen.unix {
             let (listener, file) = socket_file::listen(path)?;
-            doors.push(Self::Unix(listener, file));
+            listeners.push(Self::Unix(listener, file));
         }
         if let Some(address) = listen.tcp {
-            doors.push(tcp(address, listen)?);
+            listeners.push(tcp(address, listen)?);
         }
         if let Some(address) = listen.grbl_tcp {
-            doors.push(Self::GrblTcp(bind(address)?));
+            listeners.push(Self::GrblTcp(bind(address)?));
         }
         if let Some(path) = &listen.grbl_pty {
-            doors.push(Self::GrblPty(PtyDoor::open(path)?));
+            listeners.push(Self::GrblPty(PtyListener::open(path)?));
         }
-        Ok(doors)
+        Ok(listeners)
     }
 
     /// The next client that waits.
     ///
     /// # Errors
     /// None waits ([`ErrorKind::WouldBlock`](io::ErrorKind::WouldBlock)), or the system refuses.
-    pub fn accept(&self) -> io::Result<Comer> {
+    pub fn accept(&self) -> io::Result<Connection> {
         match self {
             Self::Unix(listener, _) => {
                 let stream = listener.accept()?.0;
                 stream.set_nonblocking(true)?;
                 bound_buffer(&stream);
                 let is_guest = !is_owner(&stream);
-                Ok(Comer {
+                Ok(Connection {
                     stream: Box::new(stream),
                     tokens: None,
                     is_guest,
@@ -138,8 +113,8 @@ impl Door {
                 })
             }
             Self::Tcp(listener, tokens) => {
-                let (stream, _) = comer(listener)?;
-                Ok(Comer {
+                let (stream, _) = accept_tcp(listener)?;
+                Ok(Connection {
                     stream: Box::new(stream),
                     tokens: Some(Arc::clone(tokens)),
                     is_guest: false,
@@ -147,15 +122,15 @@ impl Door {
                 })
             }
             Self::GrblTcp(listener) => {
-                let (stream, from) = comer(listener)?;
-                Ok(Comer {
+                let (stream, from) = accept_tcp(listener)?;
+                Ok(Connection {
                     stream: Box::new(stream),
                     tokens: None,
                     is_guest: false,
                     sender_at: Some(from.to_string()),
                 })
             }
-            Self::GrblPty(pty) => Ok(Comer {
+            Self::GrblPty(pty) => Ok(Connection {
                 stream: pty.accept()?,
                 tokens: None,
                 is_guest: false,
@@ -207,7 +182,7 @@ fn bound_buffer(stream: &impl AsFd) {
 }
 
 /// Who waits at `listener`; answers are short and wait for nothing.
-fn comer(listener: &TcpListener) -> io::Result<(TcpStream, SocketAddr)> {
+fn accept_tcp(listener: &TcpListener) -> io::Result<(TcpStream, SocketAddr)> {
     let (stream, from) = listener.accept()?;
     stream.set_nonblocking(true)?;
     let _ = stream.set_nodelay(true);
@@ -229,7 +204,7 @@ fn bind(address: SocketAddr) -> Result<TcpListener, String> {
     listening.map_err(|e| format!("{address}: {e}"))
 }
 
-fn tcp(address: SocketAddr, listen: &Listen) -> Result<Door, String> {
+fn tcp(address: SocketAddr, listen: &Listen) -> Result<Listener, String> {
     let listener = bind(address)?;
     let file = listen
         .token_file
@@ -239,7 +214,7 @@ fn tcp(address: SocketAddr, listen: &Listen) -> Result<Door, String> {
     let files = [(file.as_path(), Role::SetUp)]
         .into_iter()
         .chain(others.map(|(file, role)| (file.as_path(), *role)));
-    Ok(Door::Tcp(listener, Arc::new(Tokens::of_files(files)?)))
+    Ok(Listener::Tcp(listener, Arc::new(Tokens::of_files(files)?)))
 }
 
 #[cfg(test)]
@@ -256,18 +231,18 @@ mod tests {
         };
         for elsewhere in ["0.0.0.0:0", "192.168.0.1:5000", "[::]:0"] {
             assert!(
-                Door::open(&listen(elsewhere, true))
+                Listener::open(&listen(elsewhere, true))
                     .unwrap_err()
                     .contains("this computer alone"),
                 "{elsewhere}"
             );
         }
         assert!(
-            Door::open(&listen("127.0.0.1:0", false))
+            Listener::open(&listen("127.0.0.1:0", false))
                 .unwrap_err()
                 .contains("token file")
         );
-        let doors = Door::open(&listen("127.0.0.1:0", true)).unwrap();
-        assert_ne!(doors[0].address().unwrap().port(), 0);
+        let listeners = Listener::open(&listen("127.0.0.1:0", true)).unwrap();
+        assert_ne!(listeners[0].address().unwrap().port(), 0);
     }
 }

@@ -6,11 +6,10 @@
 //! Keys, signals and clients at sockets share one `tandem_session::operator::OperatorHub`; what it gives ends in the
 //! same atomics as a command file. One thread of ordinary priority serves all clients with non-blocking sockets and a
 //! bounded outbox for each: no client can hold up another, or a loop. A panic in the handling of a client is caught
-//! there and costs that client. Places are counted by door and by who somebody is, so that strangers cannot keep the
+//! there and costs that client. Places are counted by listener and by who somebody is, so that strangers cannot keep the
 //! owner out. The protocol is docs/operator.md.
 
 mod client;
-mod house;
 mod hub;
 mod lease;
 mod listen;
@@ -22,12 +21,13 @@ mod request;
 mod rhythm;
 mod role;
 mod server;
+mod service;
 mod session;
 mod socket_file;
 mod status;
+mod stream;
 mod token;
 
-pub(crate) use house::{House, Look, Talk};
 pub use hub::OperatorHub;
 pub(crate) use lease::{Lease, News};
 pub use listen::Listen;
@@ -35,6 +35,7 @@ pub(crate) use reply::Problem;
 pub(crate) use rhythm::Rhythm;
 pub use role::Role;
 pub use server::Server;
+pub(crate) use service::{Protocol, Service, StatusText};
 pub(crate) use session::{Answer, MAX_OWNERS};
 pub use status::{Counters, Position, StatusLine};
 pub use token::{Tokens, new as new_token};

@@ -1,7 +1,7 @@
 //! A terminal of our own, for senders that know serial ports only: they open a link, and find a device in raw mode.
 //!
-//! The other end stays with us. While nobody has the terminal open, the system calls our end hung up: that is how comers and
-//! goers are told apart, though a serial line knows neither.
+//! The other end stays with us. While nobody has the terminal open, the system calls our end hung up: that tells
+//! who comes from who goes, though a serial line knows neither.
 
 use std::fs::{self, File, Permissions};
 use std::io::{self, ErrorKind, Read, Write};
@@ -17,11 +17,11 @@ use rustix::io::Errno;
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, QueueSelector, tcflush, tcgetattr, tcsetattr};
 
-use super::listen::Stream;
+use super::stream::Stream;
 
 /// The terminal, and the link to it, which goes with this.
 #[derive(Debug)]
-pub struct PtyDoor {
+pub struct PtyListener {
     ours: File,
     theirs: PathBuf,
     link: PathBuf,
@@ -29,7 +29,7 @@ pub struct PtyDoor {
     taken: Arc<AtomicBool>,
 }
 
-impl PtyDoor {
+impl PtyListener {
     /// Makes a terminal that its owner alone may open, and `link` to it. A link to a terminal that is there is replaced.
     ///
     /// # Errors
@@ -94,7 +94,7 @@ impl PtyDoor {
     }
 }
 
-impl Drop for PtyDoor {
+impl Drop for PtyListener {
     fn drop(&mut self) {
         // Another program may have put its own in this place.
         if fs::read_link(&self.link).is_ok_and(|leads_to| leads_to == self.theirs) {
@@ -185,13 +185,13 @@ mod tests {
     fn comers_and_goers_of_a_terminal_are_told_apart() {
         let folder = tempfile::tempdir().unwrap();
         let link = folder.path().join("grbl");
-        let door = PtyDoor::open(&link).unwrap();
+        let listener = PtyListener::open(&link).unwrap();
         assert_eq!(fs::metadata(&link).unwrap().mode() & 0o777, 0o600);
-        assert!(door.accept().is_err(), "nobody has it open");
+        assert!(listener.accept().is_err(), "nobody has it open");
         for round in 0..3 {
             let mut theirs = File::options().read(true).write(true).open(&link).unwrap();
-            let mut ours = door.accept().unwrap();
-            assert!(door.accept().is_err(), "it is served already");
+            let mut ours = listener.accept().unwrap();
+            assert!(listener.accept().is_err(), "it is served already");
             theirs.write_all(b"?\x18\x03\n").unwrap();
             assert_eq!(read(ours.as_mut()), b"?\x18\x03\n", "no byte is special");
             ours.write_all(b"ok\r\n").unwrap();
@@ -203,7 +203,7 @@ mod tests {
             drop(theirs);
             assert_eq!(ours.read(&mut [0; 8]).unwrap(), 0, "it has gone");
             drop(ours);
-            assert!(door.accept().is_err());
+            assert!(listener.accept().is_err());
         }
     }
 
@@ -211,14 +211,14 @@ mod tests {
     fn a_link_to_a_terminal_is_replaced_and_a_file_is_not() {
         let folder = tempfile::tempdir().unwrap();
         let link = folder.path().join("grbl");
-        let first = PtyDoor::open(&link).unwrap();
-        let second = PtyDoor::open(&link).unwrap();
+        let first = PtyListener::open(&link).unwrap();
+        let second = PtyListener::open(&link).unwrap();
         drop(first);
         assert!(link.exists(), "it is the second's");
         drop(second);
         assert!(fs::symlink_metadata(&link).is_err());
         fs::write(&link, "kept").unwrap();
-        assert!(PtyDoor::open(&link).unwrap_err().contains("no link"));
+        assert!(PtyListener::open(&link).unwrap_err().contains("no link"));
         assert_eq!(fs::read_to_string(&link).unwrap(), "kept");
     }
 }

@@ -1,4 +1,4 @@
-//! What a client may do, by the door or the token by which it came.
+//! What a client may do, by the listener or the token by which it came.
 
 /// What a client may do. Each may do what those before it may.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

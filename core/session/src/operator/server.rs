@@ -10,16 +10,16 @@ use std::time::{Duration, Instant};
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
-use super::client::{Client, Standing};
-use super::house::{House, Look, OneRun};
+use super::client::{Client, ClientKind};
 use super::hub::OperatorHub;
 use super::lease::Lease;
-use super::listen::{Door, Listen};
+use super::listen::{Listen, Listener};
 use super::places::{crowded, has_place, make_place_for_stranger};
+use super::service::{RunService, Service, StatusText};
 
-/// Most clients that are let in at a door before those who are there are served again.
+/// Most clients that are let in at a listener before those who are there are served again.
 const MAX_COMERS: usize = 64;
-/// How long a door at which nobody can be let in is not looked at.
+/// How long a listener at which nobody can be let in is not looked at.
 const DOOR_REST: Duration = Duration::from_millis(10);
 /// Longest sleep: how soon the end of the run is seen.
 const LONGEST_SLEEP: Duration = Duration::from_millis(50);
@@ -37,34 +37,34 @@ pub struct Server {
     handle: Option<JoinHandle<()>>,
     /// The TCP address, with the port that the system chose for port 0.
     pub address: Option<SocketAddr>,
-    /// The TCP address of the door for senders of grbl's protocol, likewise.
+    /// The TCP address of the listener for senders of grbl's protocol, likewise.
     pub grbl_address: Option<SocketAddr>,
 }
 
 impl Server {
-    /// Opens every door of `listen` and starts the thread. Host, before the run.
+    /// Opens every listener of `listen` and starts the thread. Host, before the run.
     ///
     /// # Errors
     /// The place with the cause: it is taken, or not allowed.
     pub fn start(hub: Arc<OperatorHub>, listen: &Listen) -> Result<Self, String> {
-        Self::of(Arc::new(OneRun(hub)), listen)
+        Self::of(Arc::new(RunService(hub)), listen)
     }
 
-    /// The same for whoever lives behind the doors.
+    /// The same for any service.
     ///
     /// # Errors
     /// The place with the cause: it is taken, or not allowed.
-    pub(crate) fn of(house: Arc<dyn House>, listen: &Listen) -> Result<Self, String> {
-        let doors = Door::open(listen)?;
-        let address = doors.iter().find_map(Door::address);
-        let grbl_address = doors.iter().find_map(Door::grbl_address);
+    pub(crate) fn of(service: Arc<dyn Service>, listen: &Listen) -> Result<Self, String> {
+        let listeners = Listener::open(listen)?;
+        let address = listeners.iter().find_map(Listener::address);
+        let grbl_address = listeners.iter().find_map(Listener::grbl_address);
         let over = Arc::new(AtomicBool::new(false));
-        let mut room = Room::new(house, doors);
+        let mut server = ServerLoop::new(service, listeners);
         let seen = Arc::clone(&over);
         let builder = thread::Builder::new()
             .name("tandem-operator".to_string())
             .stack_size(STACK_BYTES);
-        let handle = builder.spawn(move || room.serve(&seen));
+        let handle = builder.spawn(move || server.serve(&seen));
         let handle =
             handle.map_err(|e| format!("the thread for operators cannot be started: {e}"))?;
         Ok(Self {
@@ -87,34 +87,34 @@ impl Drop for Server {
 }
 
 /// Everybody who is there.
-struct Room {
-    house: Arc<dyn House>,
-    doors: Vec<Door>,
-    /// Until when nobody is let in at each door: the system refuses to.
+struct ServerLoop {
+    service: Arc<dyn Service>,
+    listeners: Vec<Listener>,
+    /// Until when nobody is let in at each listener: the system refuses to.
     shut_until: Vec<Option<Instant>>,
-    /// Whether nobody waits at each door, by the system's word.
+    /// Whether nobody waits at each listener, by the system's word.
     nobody_waits: Vec<bool>,
     /// Whether the bell has not rung, likewise.
     bell_is_still: bool,
     clients: Vec<Client>,
     lease: Lease,
     /// Clients that ever came.
-    comers: u64,
+    connections: u64,
     /// The place among the clients at which the next status line that is due is looked for.
     next_shown: usize,
 }
 
-impl Room {
-    fn new(house: Arc<dyn House>, doors: Vec<Door>) -> Self {
+impl ServerLoop {
+    fn new(service: Arc<dyn Service>, listeners: Vec<Listener>) -> Self {
         Self {
-            house,
-            shut_until: vec![None; doors.len()],
-            nobody_waits: vec![false; doors.len()],
+            service,
+            shut_until: vec![None; listeners.len()],
+            nobody_waits: vec![false; listeners.len()],
             bell_is_still: false,
-            doors,
+            listeners,
             clients: vec![],
             lease: Lease::default(),
-            comers: 0,
+            connections: 0,
             next_shown: 0,
         }
     }
@@ -127,7 +127,7 @@ impl Room {
                 self.let_in(now);
                 self.round(now);
             }));
-            // Whatever it was, the doors stay open: somebody may need to stop the machine.
+            // Whatever it was, the listeners stay open: somebody may need to stop the machine.
             if turn.is_err() {
                 thread::sleep(LONGEST_SLEEP);
             }
@@ -140,8 +140,8 @@ impl Room {
         for at in 0..self.clients.len() {
             let client = &self.clients[at];
             // Who is known needs none, and has one.
-            let has_place = client.standing() != Standing::Stranger
-                || has_place(&self.clients, client.door, Standing::Owner);
+            let has_place = client.kind() != ClientKind::Stranger
+                || has_place(&self.clients, client.listener, ClientKind::Owner);
             self.guarded(at, now, |client, lease| client.serve(lease, has_place, now));
         }
         self.show_status(now);
@@ -160,7 +160,7 @@ impl Room {
             self.lease.forget(client.number());
         }
         self.clients.retain(|client| !client.is_gone());
-        self.house.set_clients(
+        self.service.set_clients(
             self.clients
                 .iter()
                 .filter(|client| client.is_talking())
@@ -175,7 +175,8 @@ impl Room {
         now: Instant,
         serve: impl FnOnce(&mut Client, &mut Lease) -> R,
     ) -> Option<R> {
-        let (lease, client) = (&mut self.lease, &mut self.clients[at]);
+        let lease = &mut self.lease;
+        let client = &mut self.clients[at];
         let served = catch_unwind(AssertUnwindSafe(|| serve(client, lease)));
         if served.is_err() {
             let failed = catch_unwind(AssertUnwindSafe(|| client.fail(lease, now)));
@@ -188,7 +189,8 @@ impl Room {
 
     /// Sends some of the status lines that are due: whoever asks meanwhile is answered before the others.
     fn show_status(&mut self, now: Instant) {
-        let (mut look, mut left) = (Look::default(), MAX_SHOWN);
+        let mut look = StatusText::default();
+        let mut left = MAX_SHOWN;
         let (count, first) = (self.clients.len(), self.next_shown);
         for step in 0..count {
             let at = (first + step) % count;
@@ -207,11 +209,11 @@ impl Room {
     /// Hands out what nobody has asked for in this moment.
     fn deliver(&mut self, now: Instant) {
         let is_still = std::mem::take(&mut self.bell_is_still);
-        if let Some(mut bell) = self.house.bell().filter(|_| !is_still) {
+        if let Some(mut bell) = self.service.bell().filter(|_| !is_still) {
             // What rang does not matter.
             let _ = std::io::Read::read(&mut bell, &mut [0; 64]);
         }
-        for (to, line) in self.house.post() {
+        for (to, line) in self.service.post() {
             let for_it = |client: &&mut Client| {
                 client.is_talking() && to.is_none_or(|to| client.number() == to)
             };
@@ -224,16 +226,16 @@ impl Room {
 
     /// Hands out frames of streams.
     fn show_frames(&mut self, now: Instant) {
-        for (to, frame) in self.house.frames() {
+        for (to, frame) in self.service.frames() {
             if let Some(client) = self.clients.iter_mut().find(|client| client.number() == to) {
                 client.show(&frame, now);
             }
         }
     }
 
-    /// Lets in who waits at the doors, a bounded number of them.
+    /// Lets in who waits at the listeners, a bounded number of them.
     fn let_in(&mut self, now: Instant) {
-        for (at, door) in self.doors.iter().enumerate() {
+        for (at, listener) in self.listeners.iter().enumerate() {
             if self.shut_until[at].is_some_and(|until| now < until) {
                 continue;
             }
@@ -242,12 +244,13 @@ impl Room {
                 continue;
             }
             for _ in 0..MAX_COMERS {
-                if door.asks_for_token() && !make_place_for_stranger(&mut self.clients, at, now) {
+                if listener.asks_for_token() && !make_place_for_stranger(&mut self.clients, at, now)
+                {
                     self.shut_until[at] = Some(now + DOOR_REST);
                     break;
                 }
-                let comer = match door.accept() {
-                    Ok(comer) => comer,
+                let connection = match listener.accept() {
+                    Ok(connection) => connection,
                     Err(error) if error.kind() == ErrorKind::WouldBlock => break,
                     Err(error) if error.kind() == ErrorKind::ConnectionAborted => continue,
                     // It would be ready to be asked again at once: the system has no file left, say.
@@ -256,19 +259,20 @@ impl Room {
                         break;
                     }
                 };
-                self.comers += 1;
-                let talk = match &comer.sender_at {
-                    Some(place) => self.house.sender(self.comers, place),
-                    None => Some(self.house.newcomer(self.comers, comer.tokens)),
+                self.connections += 1;
+                let protocol = match &connection.sender_at {
+                    Some(place) => self.service.sender(self.connections, place),
+                    None => Some(self.service.new_client(self.connections, connection.tokens)),
                 };
-                let Some(talk) = talk else { continue };
-                let mut client = Client::new(comer.stream, comer.is_guest, talk, at, now);
-                let standing = client.standing();
-                if has_place(&self.clients, at, standing) {
+                let Some(protocol) = protocol else { continue };
+                let mut client =
+                    Client::new(connection.stream, connection.is_guest, protocol, at, now);
+                let kind = client.kind();
+                if has_place(&self.clients, at, kind) {
                     self.lease.introduce(client.number(), client.name());
                     self.clients.push(client);
                 } else {
-                    client.turn_away(&crowded(standing), now);
+                    client.turn_away(&crowded(kind), now);
                 }
             }
         }
@@ -283,30 +287,32 @@ impl Room {
         let doors_due = self.shut_until.iter().flatten().min();
         let due = [due, doors_due.copied()].into_iter().flatten().min();
         let sleep = due.map_or(most, |due| due.saturating_duration_since(now).min(most));
-        let is_asked =
-            |(door, shut): (&Door, &Option<Instant>)| shut.is_none() && door.fd().is_some();
+        let is_asked = |(listener, shut): (&Listener, &Option<Instant>)| {
+            shut.is_none() && listener.fd().is_some()
+        };
         let doors_asked: Vec<bool> = self
-            .doors
+            .listeners
             .iter()
             .zip(&self.shut_until)
             .map(is_asked)
             .collect();
-        let doors = self
-            .doors
+        let listeners = self
+            .listeners
             .iter()
             .zip(&doors_asked)
             .filter(|(_, is_asked)| **is_asked);
-        let doors =
-            doors.filter_map(|(door, _)| Some(PollFd::from_borrowed_fd(door.fd()?, PollFlags::IN)));
+        let listeners = listeners.filter_map(|(listener, _)| {
+            Some(PollFd::from_borrowed_fd(listener.fd()?, PollFlags::IN))
+        });
         let clients = self.clients.iter().map(|client| {
             let (stream, flags) = client.interest();
             PollFd::from_borrowed_fd(stream.fd(), flags)
         });
         let bell = self
-            .house
+            .service
             .bell()
             .map(|bell| PollFd::new(bell, PollFlags::IN));
-        let mut all: Vec<PollFd<'_>> = doors.chain(clients).chain(bell).collect();
+        let mut all: Vec<PollFd<'_>> = listeners.chain(clients).chain(bell).collect();
         let timeout = Timespec {
             tv_sec: 0,
             tv_nsec: i64::from(sleep.subsec_nanos()),
@@ -330,7 +336,7 @@ impl Room {
 
     /// The run is over: everybody is told, and has a moment to read it.
     fn farewell(&mut self) {
-        self.doors.clear();
+        self.listeners.clear();
         let start = Instant::now();
         // What was said until now comes before the farewell.
         self.clients

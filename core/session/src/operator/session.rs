@@ -15,7 +15,7 @@ use super::role::Role;
 use super::token::Tokens;
 use crate::jog::JogMessage;
 
-/// Most clients that are known, at one door.
+/// Most clients that are known, at one listener.
 pub const MAX_OWNERS: usize = 16;
 
 /// What a line led to.
@@ -35,7 +35,7 @@ pub struct Session {
     /// The tokens of which the first line must name one.
     tokens: Option<Arc<Tokens>>,
     role: Role,
-    /// Whether its door has a place for one more who has named the token.
+    /// Whether its listener has a place for one more who has named the token.
     pub has_place: bool,
     lines: u64,
     subscription: Option<Rhythm>,

@@ -16,7 +16,7 @@ use tandem_sdk::{
     Attached, Driver, DriverContext, DriverDescription, Feedback, NoOptions, PluginError, Setpoint,
     local_plugin,
 };
-use tandem_session::controller::{Controller, Keeper, NoKeeper, Options, ScriptLine};
+use tandem_session::controller::{Controller, NoPersistence, Options, Persistence, ScriptLine};
 use tandem_state::Change;
 
 use crate::support::{machine, machine_with, registry};
@@ -52,7 +52,7 @@ impl SlowDisk {
     }
 }
 
-impl Keeper for SlowDisk {
+impl Persistence for SlowDisk {
     fn commit(&self, _changes: Vec<Change>) -> Result<(), String> {
         let mut disk = self.0.0.lock().unwrap();
         disk.waits += 1;
@@ -68,18 +68,18 @@ impl Keeper for SlowDisk {
 /// What `clients` do at a controller of `machine`, which runs until they are done.
 pub fn with_controller(
     machine: &Machine,
-    keeper: Box<dyn Keeper>,
+    persistence: Box<dyn Persistence>,
     options: impl FnOnce(&mut Options),
     clients: impl FnOnce(&Path, Option<std::net::SocketAddr>) + Send,
 ) {
-    with_controller_of(&registry(), machine, keeper, options, clients);
+    with_controller_of(&registry(), machine, persistence, options, clients);
 }
 
 /// The same, with these plugins.
 fn with_controller_of(
     registry: &Registry,
     machine: &Machine,
-    keeper: Box<dyn Keeper>,
+    persistence: Box<dyn Persistence>,
     options: impl FnOnce(&mut Options),
     clients: impl FnOnce(&Path, Option<std::net::SocketAddr>) + Send,
 ) {
@@ -92,7 +92,7 @@ fn with_controller_of(
     // How late a busy computer wakes the loop is asked by other tests.
     let mut machine = machine.clone();
     (machine.max_missed_periods, machine.max_missed_share) = (u32::MAX, 1.0);
-    let controller = Controller::open(&machine, registry, asked, keeper).unwrap();
+    let controller = Controller::open(&machine, registry, asked, persistence).unwrap();
     let (end, address) = (controller.ender(), controller.address());
     std::thread::scope(|scope| {
         scope.spawn(move || {
@@ -220,10 +220,10 @@ impl<S: Read + Write> Client<S> {
 /// Clients of a controller whose disk hangs where that is asked for.
 fn with_slow_disk(clients: impl FnOnce(&Path, &SlowDisk) + Send) {
     let disk = SlowDisk::default();
-    let keeper = Box::new(disk.clone());
+    let persistence = Box::new(disk.clone());
     with_controller(
         &machine("mill-3axis.toml"),
-        keeper,
+        persistence,
         |_| (),
         |socket, _| clients(socket, &disk),
     );
@@ -352,7 +352,7 @@ fn files_that_cannot_be_read_yet_keep_nobody_waiting() {
     let programs = folder.path().to_path_buf();
     with_controller(
         &on,
-        Box::new(NoKeeper),
+        Box::new(NoPersistence),
         |options| options.programs = Some(programs),
         |socket, _| {
             let (mut waiting, mut other) = (Client::in_control(socket), Client::at(socket));
@@ -411,7 +411,7 @@ impl Drop for Ends<'_> {
 fn sixteen_clients_at_once_of_which_most_mean_no_good() {
     with_controller(
         &machine("mill-3axis.toml"),
-        Box::new(NoKeeper),
+        Box::new(NoPersistence),
         |_| (),
         |socket, _| {
             let mut operator = Client::in_control(socket);
@@ -544,7 +544,7 @@ fn commands_of_the_machine_run_where_it_stands_in_lines_by_hand_and_in_programs(
     with_controller_of(
         &registry,
         &on,
-        Box::new(NoKeeper),
+        Box::new(NoPersistence),
         |_| (),
         |socket, _| {
             let mut client = Client::in_control(socket);
@@ -600,7 +600,7 @@ fn a_disk_that_hangs_under_the_files_of_a_job_holds_no_motion() {
     pipe(&trace("000001-mdi"));
     with_controller(
         &machine("mill-3axis.toml"),
-        Box::new(NoKeeper),
+        Box::new(NoPersistence),
         |options| options.record = Some(folder.path().to_owned()),
         |socket, _| {
             let mut client = Client::in_control(socket);
@@ -633,7 +633,7 @@ fn a_full_disk_under_the_files_of_a_job_holds_the_machine_where_its_file_says_so
         std::os::unix::fs::symlink("/dev/full", &trace).unwrap();
         with_controller(
             &machine_with("mill-3axis.toml", &[("recorder.on_error", mode)]),
-            Box::new(NoKeeper),
+            Box::new(NoPersistence),
             |options| options.record = Some(folder.path().to_owned()),
             |socket, _| {
                 let mut client = Client::in_control(socket);
@@ -667,7 +667,7 @@ fn what_has_come_is_repeated_to_the_bit() {
         .collect();
     with_controller(
         &on,
-        Box::new(NoKeeper),
+        Box::new(NoPersistence),
         |options| options.arrivals = Some(file.clone()),
         |socket, _| {
             let mut client = Client::in_control(socket);
@@ -698,7 +698,8 @@ fn what_has_come_is_repeated_to_the_bit() {
         let mut options = Options::of_script(script.clone());
         options.record = Some(folder.path().join(name));
         let registry = registry();
-        let controller = Controller::open(&on, &registry, options, Box::new(NoKeeper)).unwrap();
+        let controller =
+            Controller::open(&on, &registry, options, Box::new(NoPersistence)).unwrap();
         let mut driven = 0;
         controller
             .run(&mut |told| driven += usize::from(told.contains("\"event\":\"driven\"")))

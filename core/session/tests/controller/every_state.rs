@@ -1,7 +1,7 @@
 //! Every request in every state, as the table has it: the machine is really brought into the state, then asked.
 
 use serde_json::{Value, json};
-use tandem_session::controller::{ControllerState, NoKeeper, WORDS, judge};
+use tandem_session::controller::{ControllerState, NoPersistence, WORDS, judge};
 
 use crate::support::{Says, Told, machine, machine_with};
 
@@ -85,7 +85,7 @@ fn every_request_in_every_state_is_done_or_refused_as_the_table_says() {
             let enable = |options: &mut tandem_session::controller::Options| {
                 options.enable = is_enabled;
             };
-            let told = Told::by(&on, says, enable, Box::new(NoKeeper));
+            let told = Told::by(&on, says, enable, Box::new(NoPersistence));
             let place = format!("{} in {}", word.name, state.name());
             assert_eq!(told.ok(before)["state"], state.name(), "{place}");
             let answer = told.answer(id);

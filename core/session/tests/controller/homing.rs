@@ -14,7 +14,7 @@ use tandem_rig::Random;
 use tandem_rings::{Controls, Sample};
 use tandem_sdk::{Event, EventKind};
 use tandem_session::HOMING;
-use tandem_session::controller::NoKeeper;
+use tandem_session::controller::NoPersistence;
 
 use crate::support::{Says, Told, registry};
 
@@ -215,7 +215,7 @@ fn status_after_homing(portal: &Portal, text: &str) -> Value {
     let mut says = Says::new();
     says.ask(ticks(2.0), "home", json!({}));
     let after = says.ask(ticks(200.0), "status", json!({}));
-    Told::by(&machine(text), says, |_| (), Box::new(NoKeeper))
+    Told::by(&machine(text), says, |_| (), Box::new(NoPersistence))
         .ok(after)
         .clone()
 }
@@ -229,7 +229,7 @@ fn homed(portal: &Portal) -> (Told, [u64; 4]) {
     let line = says.ask(10, "mdi", json!({ "line": "G1 X20 Y-30 Z5 F3000" }));
     says.ask(ticks(10.0), "home", json!({}));
     let again = says.ask(ticks(150.0), "status", json!({}));
-    let told = Told::by(&portal.machine(), says, |_| (), Box::new(NoKeeper));
+    let told = Told::by(&portal.machine(), says, |_| (), Box::new(NoPersistence));
     (told, [home, first, line, again])
 }
 
@@ -317,7 +317,7 @@ fn an_abort_while_it_squares_itself_moves_nothing_and_the_next_homing_does_it() 
         let rests = says.ask(ticks(2.0), "status", json!({}));
         says.ask(10, "home", json!({}));
         let after = says.ask(ticks(200.0), "status", json!({}));
-        let told = Told::by(&portal.machine(), says, |_| (), Box::new(NoKeeper));
+        let told = Told::by(&portal.machine(), says, |_| (), Box::new(NoPersistence));
         _ = told.answer(abort);
         let (rests, status) = (told.ok(rests), told.ok(after));
         assert_ne!(rests["state"], "fault", "{portal:?} {rests}");

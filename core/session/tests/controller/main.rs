@@ -18,7 +18,7 @@ use serde_json::{Value, json};
 use tandem_gcode::Program;
 use tandem_host::{Clock, Run, Switches};
 use tandem_machine::Machine;
-use tandem_session::controller::{ControllerState, NoKeeper, requests};
+use tandem_session::controller::{ControllerState, NoPersistence, requests};
 
 use support::{Kept, Says, Told, examples, machine, registry};
 
@@ -41,7 +41,7 @@ fn a_drive_that_faults_is_reset_by_its_word_and_by_no_other() {
         let done = says.ask(8000, "status", json!({}));
         let disable = says.ask(10, "disable", json!({}));
         says.ask(1000, "status", json!({}));
-        let told = Told::by(&machine, says, |_| (), Box::new(NoKeeper));
+        let told = Told::by(&machine, says, |_| (), Box::new(NoPersistence));
         for id in [line, reset, back, disable] {
             told.ok(id);
         }
@@ -211,7 +211,7 @@ fn lines_that_come_in_time_are_planned_through() {
             .map(|nth| says.ask(every_ticks, "mdi", json!({ "line": chord(nth) })))
             .collect();
         says.ask(20_000, "status", json!({}));
-        let told = Told::by(&machine, says, |_| (), Box::new(NoKeeper));
+        let told = Told::by(&machine, says, |_| (), Box::new(NoPersistence));
         for id in &ids {
             _ = told.ok(*id);
         }
@@ -249,7 +249,7 @@ fn a_sender_that_stalls_stops_the_machine_on_the_path_and_goes_on_from_there() {
         ));
     }
     let end = says.ask(3000, "status", json!({}));
-    let told = Told::by(&machine, says, |_| (), Box::new(NoKeeper));
+    let told = Told::by(&machine, says, |_| (), Box::new(NoPersistence));
     for id in &ids {
         _ = told.ok(*id);
     }
@@ -292,7 +292,7 @@ fn every_request_has_one_answer_in_real_states() {
             &machine(name),
             says,
             |options| options.enable = enable,
-            Box::new(NoKeeper),
+            Box::new(NoPersistence),
         );
         for id in &ids {
             _ = told.answer(*id);

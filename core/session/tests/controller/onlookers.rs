@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 use tandem_rig::Random;
-use tandem_session::controller::NoKeeper;
+use tandem_session::controller::NoPersistence;
 
 use crate::doors::{Client, NEVER, with_controller};
 use crate::support::machine;
@@ -238,7 +238,7 @@ fn sixteen_clients_at_50_hz_keep_nobody_waiting_who_asks() {
     let mut rounds: [Vec<Round>; 2] = [vec![], vec![]];
     with_controller(
         &machine("mill-3axis.toml"),
-        Box::new(NoKeeper),
+        Box::new(NoPersistence),
         |options| {
             options.listen.tcp = Some("127.0.0.1:0".parse().unwrap());
             options.listen.token_file = Some(token.clone());

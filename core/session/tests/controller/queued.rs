@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 use tandem_machine::Machine;
-use tandem_session::controller::{NoKeeper, ScriptLine};
+use tandem_session::controller::{NoPersistence, ScriptLine};
 
 use crate::support::{Says, Told, machine, machine_with};
 
@@ -118,7 +118,7 @@ fn every_queued_line_is_told_once_whether_it_is_driven() {
             says.ask(*ticks, request, json!({}));
         }
         says.ask(12_000, "status", json!({}));
-        let told = Told::by(&case.machine, says, |_| (), Box::new(NoKeeper));
+        let told = Told::by(&case.machine, says, |_| (), Box::new(NoPersistence));
         let what = case.what;
         for (id, driven) in ids.iter().zip(case.driven) {
             assert_eq!(told.ok(*id)["judged"], true, "{what}");
@@ -146,7 +146,7 @@ fn a_refused_line_is_no_queued_line() {
     let ids = ["G1 X40 F1200", "G1 X4000", "G1 Y10"]
         .map(|line| says.ask(1000, "mdi", json!({ "line": line })));
     says.ask(5000, "status", json!({}));
-    let told = Told::by(&mill(), says, |_| (), Box::new(NoKeeper));
+    let told = Told::by(&mill(), says, |_| (), Box::new(NoPersistence));
     assert!(told.why(ids[1]).contains("travel"), "{}", told.why(ids[1]));
     assert_eq!(
         ids.map(|id| told_of(&told, id)),
@@ -177,7 +177,7 @@ fn a_stop_overtakes_what_is_about_to_begin() {
                     ("driver.options.unknown_start_mm", "0"),
                 ],
             );
-            let told = Told::by(&on, says, |_| (), Box::new(NoKeeper));
+            let told = Told::by(&on, says, |_| (), Box::new(NoPersistence));
             told.ok(stopped);
             told.answer(begins);
             let status = told.ok(after);
@@ -207,7 +207,7 @@ fn an_emergency_stop_behind_a_reset_or_an_enabling_is_in_force() {
             // Taken back behind it, the machine is ready.
             says.ask(10, "reset", json!({}));
             let back = says.ask(2000, "status", json!({}));
-            let told = Told::by(&slow, says, |_| (), Box::new(NoKeeper));
+            let told = Told::by(&slow, says, |_| (), Box::new(NoPersistence));
             told.ok(stop);
             let place = format!("{later} periods behind {request}");
             assert!(told.answer(begins).get("error").is_some(), "{place}");
@@ -231,7 +231,7 @@ fn an_emergency_stop_while_drives_let_go_is_in_force() {
         let after = says.ask(2000, "status", json!({}));
         says.ask(10, "reset", json!({}));
         let back = says.ask(2000, "status", json!({}));
-        let told = Told::by(&slow, says, |_| (), Box::new(NoKeeper));
+        let told = Told::by(&slow, says, |_| (), Box::new(NoPersistence));
         told.ok(stop);
         told.answer(disable);
         assert_eq!(
@@ -254,7 +254,7 @@ fn a_jog_that_is_asked_for_in_any_period_of_the_one_before_is_driven() {
         says.ask(apart, "jog", jog());
         shown.push((apart, says.ask(400, "status", json!({}))));
     }
-    let told = Told::by(&mill(), says, |_| (), Box::new(NoKeeper));
+    let told = Told::by(&mill(), says, |_| (), Box::new(NoPersistence));
     let mut jobs = 0;
     for ((apart, id), steps) in shown.into_iter().zip((2..).step_by(2)) {
         let x_mm = told.ok(id)["position"]["x_mm"].as_f64().unwrap();
@@ -286,9 +286,13 @@ fn lines_that_wait_at_the_end_are_told() {
     let registry = crate::support::registry();
     let options = tandem_session::controller::Options::of_script(says.lines);
     let mill = mill();
-    let controller =
-        tandem_session::controller::Controller::open(&mill, &registry, options, Box::new(NoKeeper))
-            .unwrap();
+    let controller = tandem_session::controller::Controller::open(
+        &mill,
+        &registry,
+        options,
+        Box::new(NoPersistence),
+    )
+    .unwrap();
     let end = controller.ender();
     let mut told = Told(vec![]);
     controller

@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use serde_json::{Value, json};
 use tandem_rig::Random;
-use tandem_session::controller::{Controller, NoKeeper, Options, ScriptLine};
+use tandem_session::controller::{Controller, NoPersistence, Options, ScriptLine};
 
 use crate::support::{machine, registry};
 
@@ -38,7 +38,7 @@ fn drive(name: &str, script: Vec<ScriptLine>) -> (std::collections::BTreeMap<Str
     let registry = registry();
     let asked = Options::of_script(script);
     let controller =
-        Controller::open(&machine(name), &registry, asked, Box::new(NoKeeper)).unwrap();
+        Controller::open(&machine(name), &registry, asked, Box::new(NoPersistence)).unwrap();
     let (mut counts, mut at_first, mut now) = (std::collections::BTreeMap::new(), None, 0);
     controller
         .run(&mut |line| {

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
-use tandem_session::controller::NoKeeper;
+use tandem_session::controller::NoPersistence;
 
 use crate::support::{Says, Told, machine};
 
@@ -31,7 +31,7 @@ fn the_path_is_seen_before_it_is_driven_and_where_the_machine_was_behind_it() {
         &machine("mill-3axis.toml"),
         says,
         |_| (),
-        Box::new(NoKeeper),
+        Box::new(NoPersistence),
     );
     // printf '…' | sha256sum
     let hash = told.ok(load)["hash"].as_str().unwrap();
@@ -105,7 +105,7 @@ fn a_packed_path_is_the_same_path_from_any_point_on_however_long_it_is() {
         &machine("mill-3axis.toml"),
         says,
         |_| (),
-        Box::new(NoKeeper),
+        Box::new(NoPersistence),
     );
     let plain = told.ok(plain);
     let first = told.ok(all[0]);
@@ -163,7 +163,7 @@ fn lines_by_hand_are_drawn_as_they_are_planned() {
         &machine("mill-3axis.toml"),
         says,
         |_| (),
-        Box::new(NoKeeper),
+        Box::new(NoPersistence),
     );
     assert_eq!(
         points(&told.ok(path)["pieces"]),
@@ -196,7 +196,7 @@ fn the_scope_sees_every_sample_and_a_capture_those_around_its_trigger() {
         &machine("mill-3axis.toml"),
         says,
         |_| (),
-        Box::new(NoKeeper),
+        Box::new(NoPersistence),
     );
     assert_eq!(told.ok(scope)["every"], 2);
     assert!(told.why(none).contains("no signal x_command"));
@@ -266,7 +266,7 @@ fn a_program_is_brought_whole_or_not_at_all() {
         &machine("mill-3axis.toml"),
         says,
         |options| options.programs = Some(programs),
-        Box::new(NoKeeper),
+        Box::new(NoPersistence),
     );
     assert_eq!(told.ok(first)["more"], true);
     assert_eq!(told.ok(half)["programs"], json!([]));
@@ -318,7 +318,7 @@ fn the_lines_of_the_program_that_is_loaded_are_told() {
         &machine("mill-3axis.toml"),
         says,
         |_| (),
-        Box::new(NoKeeper),
+        Box::new(NoPersistence),
     );
     let nothing = told.ok(none);
     assert_eq!(
@@ -357,7 +357,7 @@ fn keys_of_axes_that_the_machine_lacks_are_refused() {
         &machine("mill-3axis.toml"),
         says,
         |_| (),
-        Box::new(NoKeeper),
+        Box::new(NoPersistence),
     );
     assert!(told.why(wrong).contains("\"w_mm\"") && told.why(unit).contains("\"x_deg\""));
     told.ok(set);
@@ -372,7 +372,7 @@ fn how_well_the_drives_are_heard_is_seen_where_they_are_on_a_bus() {
         let late = says.ask(90, "status", json!({}));
         let after = says.ask(1000, "status", json!({}));
         let on = crate::support::machine_with("mill-3axis.toml", keys);
-        let told = Told::by(&on, says, |_| (), Box::new(NoKeeper));
+        let told = Told::by(&on, says, |_| (), Box::new(NoPersistence));
         [late, after].map(|id| told.ok(id)["bus"].clone())
     };
     assert_eq!(bus(&[]), [Value::Null, Value::Null]);

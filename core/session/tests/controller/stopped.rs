@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use serde_json::json;
 use tandem_rig::Random;
-use tandem_session::controller::NoKeeper;
+use tandem_session::controller::NoPersistence;
 
 use crate::doors::{Client, with_controller};
 use crate::scale::from_environment;
@@ -49,7 +49,12 @@ fn an_abort_behind_a_start_is_never_lost() {
             client.aside.clear();
         }
     };
-    with_controller(&mill, Box::new(NoKeeper), |_| (), |socket, _| run(socket));
+    with_controller(
+        &mill,
+        Box::new(NoPersistence),
+        |_| (),
+        |socket, _| run(socket),
+    );
     println!("{stops} stops, TANDEM_SEED={seed}: {aborted} aborted, {unbegun} not begun");
     assert!(aborted > 0);
 }
@@ -100,6 +105,11 @@ fn an_abort_at_the_end_of_a_job_is_one() {
             client.aside.clear();
         }
     };
-    with_controller(&slow, Box::new(NoKeeper), |_| (), |socket, _| run(socket));
+    with_controller(
+        &slow,
+        Box::new(NoPersistence),
+        |_| (),
+        |socket, _| run(socket),
+    );
     println!("TANDEM_SEED={seed}: {outcomes:?} came behind the end, and before it");
 }

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use tandem_gcode::Lasting;
 use tandem_host::Registry;
 use tandem_machine::Machine;
-use tandem_session::controller::{Controller, Keeper, Options, ScriptLine};
+use tandem_session::controller::{Controller, Options, Persistence, ScriptLine};
 use tandem_state::Change;
 
 pub fn examples() -> PathBuf {
@@ -69,12 +69,12 @@ impl Told {
         machine: &Machine,
         says: Says,
         options: impl FnOnce(&mut Options),
-        keeper: Box<dyn Keeper>,
+        persistence: Box<dyn Persistence>,
     ) -> Self {
         let registry = registry();
         let mut asked = Options::of_script(says.lines);
         options(&mut asked);
-        let controller = Controller::open(machine, &registry, asked, keeper).unwrap();
+        let controller = Controller::open(machine, &registry, asked, persistence).unwrap();
         let mut told = vec![];
         controller
             .run(&mut |line| told.extend(serde_json::from_str(line).ok()))
@@ -141,7 +141,7 @@ impl Told {
 #[derive(Clone, Default)]
 pub struct Kept(pub Arc<Mutex<Vec<Lasting>>>, pub Arc<Mutex<Vec<Change>>>);
 
-impl Keeper for Kept {
+impl Persistence for Kept {
     fn commit(&self, changes: Vec<Change>) -> Result<(), String> {
         for change in changes {
             self.record(change);

@@ -4,7 +4,7 @@ use std::net::TcpStream;
 use std::path::Path;
 
 use serde_json::json;
-use tandem_session::controller::NoKeeper;
+use tandem_session::controller::NoPersistence;
 use tandem_session::operator::Role;
 
 use crate::doors::{Client, NEVER, with_controller};
@@ -18,7 +18,7 @@ fn a_token_lets_a_client_do_what_it_is_for() {
     let token = |path: &Path| std::fs::read_to_string(path).unwrap().trim().to_string();
     with_controller(
         &machine("mill-3axis.toml"),
-        Box::new(NoKeeper),
+        Box::new(NoPersistence),
         |options| {
             options.listen.tcp = Some("127.0.0.1:0".parse().unwrap());
             options.listen.token_file = Some(all.clone());

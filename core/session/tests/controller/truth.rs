@@ -6,7 +6,7 @@ use std::path::Path;
 use serde_json::{Value, json};
 use tandem_machine::Machine;
 use tandem_rig::Random;
-use tandem_session::controller::NoKeeper;
+use tandem_session::controller::NoPersistence;
 use tandem_state::{Change, Outcome, Owner, Store};
 
 use crate::scale::from_environment;
@@ -83,7 +83,7 @@ fn behind_an_emergency_stop_the_feed_is_none() {
         &machine("mill-3axis.toml"),
         says,
         |_| (),
-        Box::new(NoKeeper),
+        Box::new(NoPersistence),
     );
     let feed = |id: u64| told.ok(id)["feed_mm_per_min"].as_f64().unwrap();
     assert!((feed(moves) - 1200.0).abs() < 1e-6, "{}", feed(moves));
@@ -105,7 +105,7 @@ fn behind_the_end_of_a_program_what_it_wrote_lasts_and_modes_are_as_at_the_start
         &machine("mill-3axis.toml"),
         says,
         |_| (),
-        Box::new(NoKeeper),
+        Box::new(NoPersistence),
     );
     let status = told.ok(after);
     assert_eq!(told.jobs()[0], ("program".to_string(), "done".to_string()));
@@ -148,7 +148,7 @@ fn behind_letting_go_the_drives_say_where_they_stand() {
     let after = says.ask(2000, "status", json!({}));
     says.ask(10, "mdi", json!({ "line": "G91 G0 Z1" }));
     let moved = says.ask(2000, "status", json!({}));
-    let told = Told::by(&machine, says, |_| (), Box::new(NoKeeper));
+    let told = Told::by(&machine, says, |_| (), Box::new(NoPersistence));
     for id in [line, enable] {
         told.ok(id);
     }
@@ -280,7 +280,7 @@ fn a_driver_that_was_lost_is_attached_again_by_a_reset() {
         &vanishing("mill-3axis.toml", 4000),
         says,
         |_| (),
-        Box::new(NoKeeper),
+        Box::new(NoPersistence),
     );
     told.ok(line);
     let at = |id: u64| told.ok(id)["position"]["x_mm"].as_f64().unwrap();
@@ -320,7 +320,7 @@ fn homing_is_asked_again_where_the_drives_were_lost_and_not_behind_an_emergency_
         &machine("mill-homing.toml"),
         says,
         |_| (),
-        Box::new(NoKeeper),
+        Box::new(NoPersistence),
     );
     let all: Value = not_homed(&told, first);
     assert!(!all.as_array().unwrap().is_empty());
@@ -341,7 +341,7 @@ fn homing_is_asked_again_where_the_drives_were_lost_and_not_behind_an_emergency_
         &vanishing("mill-homing.toml", 95_000),
         says,
         |_| (),
-        Box::new(NoKeeper),
+        Box::new(NoPersistence),
     );
     assert_eq!(not_homed(&told, homed), json!([]));
     assert_eq!(told.ok(lost)["state"], "fault");
@@ -427,7 +427,7 @@ fn a_machine_that_is_said_to_rest_stays_where_it_is_shown() {
             says.ask(200 + random.below(300), stop, with.clone());
             let asked: Vec<_> = (0..300).map(|_| says.ask(1, "status", json!({}))).collect();
             let mill = machine("mill-3axis.toml");
-            let told = Told::by(&mill, says, |_| (), Box::new(NoKeeper));
+            let told = Told::by(&mill, says, |_| (), Box::new(NoPersistence));
             let shown: Vec<_> = asked
                 .iter()
                 .map(|id| told.ok(*id))
@@ -476,7 +476,7 @@ fn an_abort_in_any_of_the_last_periods_is_one() {
             }
             let abort = says.ask(150 + late, "abort", json!({}));
             let after = says.ask(2000, "status", json!({}));
-            let told = Told::by(&mill, says, |_| (), Box::new(NoKeeper));
+            let told = Told::by(&mill, says, |_| (), Box::new(NoPersistence));
             let acknowledged = told.answer(abort).get("ok").is_some();
             let (_, outcome) = told.jobs().pop().unwrap();
             let (expected, is_on) = if acknowledged {
@@ -517,7 +517,7 @@ fn behind_the_end_of_a_program_nothing_turns() {
         &machine("mill-3axis.toml"),
         says,
         |_| (),
-        Box::new(NoKeeper),
+        Box::new(NoPersistence),
     );
     let seen = |id| {
         let status = told.ok(id);

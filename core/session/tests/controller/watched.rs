@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 use serde_json::json;
-use tandem_session::controller::NoKeeper;
+use tandem_session::controller::NoPersistence;
 
 use crate::doors::{Client, with_controller};
 use crate::support::machine;
@@ -55,7 +55,7 @@ fn driven(folder: &Path, is_watched: bool) -> Option<Vec<String>> {
     let mut starvations = 0;
     with_controller(
         &machine("mill-3axis.toml"),
-        Box::new(NoKeeper),
+        Box::new(NoPersistence),
         |options| options.record = Some(folder.to_path_buf()),
         |socket, _| {
             let mut operator = Client::in_control(socket);

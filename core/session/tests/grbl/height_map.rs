@@ -74,7 +74,7 @@ enum Step {
 enum Waits {
     Nothing,
     Answer,
-    Standing,
+    Standstill,
 }
 
 #[derive(Default)]
@@ -166,7 +166,7 @@ impl Wizard {
         let is_over = match self.waits {
             Waits::Nothing => false,
             Waits::Answer => line == "ok",
-            Waits::Standing => line.starts_with('<') && state(line) == "Idle",
+            Waits::Standstill => line.starts_with('<') && state(line) == "Idle",
         };
         if is_over {
             self.waits = Waits::Nothing;
@@ -186,7 +186,7 @@ impl VirtualSender for Wizard {
             return false;
         }
         if self.waits != Waits::Nothing {
-            if tick.is_multiple_of(25) && self.waits == Waits::Standing {
+            if tick.is_multiple_of(25) && self.waits == Waits::Standstill {
                 say.push(b'?');
             }
             return true;
@@ -201,7 +201,7 @@ impl VirtualSender for Wizard {
                 self.keeps = true;
                 say.extend(format!("{line}\n").into_bytes());
             }
-            Some(Step::Stand) => self.waits = Waits::Standing,
+            Some(Step::Stand) => self.waits = Waits::Standstill,
             None => return false,
         }
         true

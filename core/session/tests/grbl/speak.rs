@@ -11,7 +11,7 @@ use serde_json::Value;
 use tandem_gcode::Program;
 use tandem_host::{Clock, Registry, Run, Switches};
 use tandem_machine::Machine;
-use tandem_session::controller::{Controller, NoKeeper, Options, ScriptLine, VirtualSender};
+use tandem_session::controller::{Controller, NoPersistence, Options, ScriptLine, VirtualSender};
 
 pub fn machine(name: &str, sets: &[(&str, &str)]) -> Machine {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines");
@@ -53,7 +53,8 @@ pub fn serve_recorded(
     let registry = registry();
     let mut options = Options::of_script(script);
     options.record = record.map(Path::to_path_buf);
-    let mut controller = Controller::open(machine, &registry, options, Box::new(NoKeeper)).unwrap();
+    let mut controller =
+        Controller::open(machine, &registry, options, Box::new(NoPersistence)).unwrap();
     for sender in senders {
         controller.add_sender(sender);
     }

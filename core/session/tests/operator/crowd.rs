@@ -5,7 +5,7 @@ use std::net::TcpStream;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
 use std::thread;
 
-use super::Office;
+use super::TestServer;
 
 /// Strangers that come at the same time, and come again whenever they are sent away.
 const STRANGERS: usize = 40;
@@ -14,9 +14,9 @@ const HOLDS: usize = 60;
 
 #[test]
 fn forty_strangers_who_come_again_and_again_do_not_keep_the_owner_out() {
-    let office = Office::open();
+    let server = TestServer::open();
     let (over, came) = (AtomicBool::new(false), AtomicUsize::new(0));
-    let address = office.address();
+    let address = server.address();
     thread::scope(|scope| {
         for stranger in 0..STRANGERS {
             let (over, came) = (&over, &came);
@@ -42,8 +42,8 @@ fn forty_strangers_who_come_again_and_again_do_not_keep_the_owner_out() {
         while came.load(Relaxed) < STRANGERS {
             thread::yield_now();
         }
-        let unix = (0..HOLDS).filter(|_| office.over_unix().holds()).count();
-        let tcp = (0..HOLDS).filter(|_| office.over_tcp().holds()).count();
+        let unix = (0..HOLDS).filter(|_| server.over_unix().holds()).count();
+        let tcp = (0..HOLDS).filter(|_| server.over_tcp().holds()).count();
         over.store(true, Relaxed);
         assert_eq!(
             (unix, tcp),
@@ -56,27 +56,27 @@ fn forty_strangers_who_come_again_and_again_do_not_keep_the_owner_out() {
 
 #[test]
 fn whoever_is_known_has_sixteen_places_at_each_door() {
-    let office = Office::open();
-    let mut unix: Vec<_> = (0..16).map(|_| office.over_unix()).collect();
+    let server = TestServer::open();
+    let mut unix: Vec<_> = (0..16).map(|_| server.over_unix()).collect();
     assert!(unix.iter_mut().all(super::Client::holds));
-    let mut tcp: Vec<_> = (0..16).map(|_| office.over_tcp()).collect();
+    let mut tcp: Vec<_> = (0..16).map(|_| server.over_tcp()).collect();
     assert!(
         tcp.iter_mut().all(super::Client::holds),
         "the other door has its own"
     );
     let mut late = String::new();
-    let mut stream = TcpStream::connect(office.address()).unwrap();
-    writeln!(stream, "{{\"token\":\"{}\"}}", office.token).unwrap();
+    let mut stream = TcpStream::connect(server.address()).unwrap();
+    writeln!(stream, "{{\"token\":\"{}\"}}", server.token).unwrap();
     stream.read_to_string(&mut late).unwrap();
     assert!(late.contains("16 clients are here already"), "{late}");
     drop(tcp.pop());
     // The server sees that a moment later.
-    while !office.try_tcp() {
+    while !server.try_tcp() {
         thread::yield_now();
     }
 }
 
-impl Office {
+impl TestServer {
     fn try_tcp(&self) -> bool {
         let mut answer = [0; 256];
         let mut stream = TcpStream::connect(self.address()).unwrap();

@@ -35,13 +35,13 @@ impl JogInput for Nobody {
 }
 
 /// A hub with both doors, for programs and for jogs.
-struct Office {
+struct TestServer {
     folder: tempfile::TempDir,
     server: Server,
     token: String,
 }
 
-impl Office {
+impl TestServer {
     fn open() -> Self {
         let machine =
             Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-4axis.toml");

@@ -8,7 +8,7 @@ use std::os::unix::net::UnixStream;
 use proptest::prelude::*;
 use serde_json::Value;
 
-use super::{NEVER, Office};
+use super::{NEVER, TestServer};
 
 /// Numbers as JSON has them, with those at its edges.
 fn number() -> impl Strategy<Value = String> {
@@ -185,10 +185,10 @@ fn hear_all(mut stream: UnixStream) -> Vec<u8> {
 
 #[test]
 fn whatever_a_client_sends_it_is_answered_in_json_and_everybody_else_is_still_served() {
-    let office = Office::open();
-    let friend = RefCell::new(office.over_unix());
+    let server = TestServer::open();
+    let friend = RefCell::new(server.over_unix());
     proptest!(ProptestConfig::with_cases(400), |(lines in prop::collection::vec(line(), 1..8))| {
-        let mut stream = UnixStream::connect(office.socket()).unwrap();
+        let mut stream = UnixStream::connect(server.socket()).unwrap();
         stream.set_read_timeout(Some(NEVER)).unwrap();
         for line in &lines {
             // It may have been sent away already.
@@ -208,8 +208,8 @@ fn whatever_a_client_sends_it_is_answered_in_json_and_everybody_else_is_still_se
 
 #[test]
 fn a_rate_that_no_clock_can_wait_for_is_refused_with_its_field_and_ends_nothing() {
-    let office = Office::open();
-    let mut client = office.over_unix();
+    let server = TestServer::open();
+    let mut client = server.over_unix();
     for rate in ["1e-21", "1e-300", "5e-324", "-1", "101", "1e300", "0.0099"] {
         let answer = client.ask(&format!("{{\"subscribe\":{{\"rate_hz\":{rate}}}}}"));
         assert!(
@@ -227,5 +227,5 @@ fn a_rate_that_no_clock_can_wait_for_is_refused_with_its_field_and_ends_nothing(
             "{rate}: {answer}"
         );
     }
-    assert!(client.holds() && office.over_unix().holds());
+    assert!(client.holds() && server.over_unix().holds());
 }

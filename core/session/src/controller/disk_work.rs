@@ -4,25 +4,23 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
-use std::time::{Duration, Instant};
 
-use super::desk::Desk;
+use super::arrivals::wait_while;
+use super::dispatcher::Dispatcher;
 
 /// Stack of a thread, bytes: it is locked into memory with the rest.
 const STACK_BYTES: usize = 512 * 1024;
-/// How long the end of the controller waits for disks.
-const PATIENCE: Duration = Duration::from_secs(2);
 
-/// Does one thing after the other for a client.
-pub struct Clerk {
-    desk: Arc<Desk>,
+/// Work for one client that waits for a disk.
+pub struct DiskWork {
+    dispatcher: Arc<Dispatcher>,
     busy: Arc<AtomicUsize>,
 }
 
-impl Clerk {
-    pub fn new(desk: Arc<Desk>) -> Self {
+impl DiskWork {
+    pub fn new(dispatcher: Arc<Dispatcher>) -> Self {
         Self {
-            desk,
+            dispatcher,
             busy: Arc::default(),
         }
     }
@@ -34,22 +32,23 @@ impl Clerk {
 
     /// Has `work` done; when it is over, whoever serves clients is woken. `false` where the computer has no thread for it.
     #[must_use]
-    pub fn give(&self, work: impl FnOnce(&Desk) + Send + 'static) -> bool {
-        let (desk, busy) = (Arc::clone(&self.desk), Arc::clone(&self.busy));
-        let clerks = Arc::clone(&desk.clerks);
+    pub fn give(&self, work: impl FnOnce(&Dispatcher) + Send + 'static) -> bool {
+        let dispatcher = Arc::clone(&self.dispatcher);
+        let busy = Arc::clone(&self.busy);
+        let disk_threads = Arc::clone(&dispatcher.disk_threads);
         busy.fetch_add(1, Ordering::AcqRel);
-        clerks.fetch_add(1, Ordering::AcqRel);
-        let at_work = Arc::clone(&clerks);
+        disk_threads.fetch_add(1, Ordering::AcqRel);
+        let at_work = Arc::clone(&disk_threads);
         let builder = thread::Builder::new()
             .name("tandem-disk".to_string())
             .stack_size(STACK_BYTES);
         let begun = builder.spawn(move || {
             // Its client is told by the work itself; a defect costs nobody else anything.
-            let _ = catch_unwind(AssertUnwindSafe(|| work(&desk)));
+            let _ = catch_unwind(AssertUnwindSafe(|| work(&dispatcher)));
             busy.fetch_sub(1, Ordering::AcqRel);
-            desk.ring();
-            drop(desk);
-            clerks.fetch_sub(1, Ordering::AcqRel);
+            dispatcher.ring();
+            drop(dispatcher);
+            disk_threads.fetch_sub(1, Ordering::AcqRel);
         });
         if begun.is_err() {
             at_work.fetch_sub(1, Ordering::AcqRel);
@@ -60,14 +59,6 @@ impl Clerk {
 }
 
 /// Waits for all that are at work, as long as the end of a controller may: a disk that hangs does not keep it from ending.
-pub fn wait_for_all(desk: &Desk) {
-    wait_while(|| desk.clerks.load(Ordering::Acquire) > 0);
-}
-
-/// Waits while a disk `takes` its time, as long as the end of a controller may.
-pub fn wait_while(takes: impl Fn() -> bool) {
-    let began = Instant::now();
-    while takes() && began.elapsed() < PATIENCE {
-        thread::sleep(Duration::from_millis(1));
-    }
+pub fn wait_for_all(dispatcher: &Dispatcher) {
+    wait_while(|| dispatcher.disk_threads.load(Ordering::Acquire) > 0);
 }

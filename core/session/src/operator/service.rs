@@ -1,4 +1,4 @@
-//! Who lives behind the doors: a run with its protocol, or a controller that stays with another.
+//! What the thread that serves clients asks of the machine: a run with its protocol, or a controller that stays with another.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -13,9 +13,9 @@ use super::token::Tokens;
 
 /// The machine as everybody is shown it whose status line is due: it is looked at and made into text once for all of them.
 #[derive(Debug, Default)]
-pub struct Look(Option<String>);
+pub struct StatusText(Option<String>);
 
-impl Look {
+impl StatusText {
     /// What was seen, as JSON; whoever asks first looks.
     pub fn text<S: Serialize>(&mut self, look: impl FnOnce() -> S) -> &str {
         // What is shown has neither a map with other keys than words nor anything else that is no JSON.
@@ -25,12 +25,12 @@ impl Look {
 }
 
 /// One client's conversation, in whichever protocol. On the thread that serves clients.
-pub trait Talk: Send {
+pub trait Protocol: Send {
     /// The client's number.
     fn client(&self) -> u64;
     /// Whether the client has said who it is, or need not.
     fn is_known(&self) -> bool;
-    /// Whether its door has a place for one more who has named the token.
+    /// Whether its listener has a place for one more who has named the token.
     fn set_has_place(&mut self, has_place: bool);
     /// What the client is told before it says anything.
     fn greeting(&self) -> Option<String> {
@@ -40,7 +40,7 @@ pub trait Talk: Send {
     fn name(&self) -> String {
         format!("client {}", self.client())
     }
-    /// Whether the client sends bytes that act one by one, beside lines: then [`Talk::bytes`] takes them.
+    /// Whether the client sends bytes that act one by one, beside lines: then [`Protocol::bytes`] takes them.
     fn is_raw(&self) -> bool {
         false
     }
@@ -60,7 +60,7 @@ pub trait Talk: Send {
     fn turn(&mut self, _lease: &mut Lease, _now: Instant) -> String {
         String::new()
     }
-    /// Post of the house as this client reads it.
+    /// A line for this client that it has not asked for, as it reads it.
     fn told(&mut self, line: &str) -> String {
         line.to_string()
     }
@@ -77,7 +77,7 @@ pub trait Talk: Send {
     /// When the next status line is due.
     fn due(&self) -> Option<Instant>;
     /// A status line that was subscribed to; so many were lost before it.
-    fn telemetry(&mut self, lost: u64, look: &mut Look) -> String;
+    fn telemetry(&mut self, lost: u64, look: &mut StatusText) -> String;
     /// The last line.
     fn ended(&self, lost: u64) -> String;
     /// A frame of a stream that the client has asked for; so many were lost before it.
@@ -91,11 +91,11 @@ pub trait Talk: Send {
 }
 
 /// What the thread that serves clients needs of the machine.
-pub trait House: Send + Sync {
-    /// Somebody has come, whose first line must name one of `tokens`.
-    fn newcomer(&self, number: u64, tokens: Option<Arc<Tokens>>) -> Box<dyn Talk>;
-    /// A sender of grbl's protocol has come, at the door named `place`; none where nobody lives here who speaks it.
-    fn sender(&self, _number: u64, _place: &str) -> Option<Box<dyn Talk>> {
+pub trait Service: Send + Sync {
+    /// A client has come, whose first line must name one of `tokens`.
+    fn new_client(&self, number: u64, tokens: Option<Arc<Tokens>>) -> Box<dyn Protocol>;
+    /// A sender of grbl's protocol has come, at the listener named `place`; none where this service does not speak it.
+    fn sender(&self, _number: u64, _place: &str) -> Option<Box<dyn Protocol>> {
         None
     }
     /// So many clients could give commands now.
@@ -115,10 +115,10 @@ pub trait House: Send + Sync {
 }
 
 /// A run, or a session of runs, that ends with its process.
-pub struct OneRun(pub Arc<OperatorHub>);
+pub struct RunService(pub Arc<OperatorHub>);
 
-impl House for OneRun {
-    fn newcomer(&self, number: u64, tokens: Option<Arc<Tokens>>) -> Box<dyn Talk> {
+impl Service for RunService {
+    fn new_client(&self, number: u64, tokens: Option<Arc<Tokens>>) -> Box<dyn Protocol> {
         Box::new(Protocol1 {
             hub: Arc::clone(&self.0),
             session: Session::new(number, tokens),
@@ -139,7 +139,7 @@ struct Protocol1 {
     session: Session,
 }
 
-impl Talk for Protocol1 {
+impl Protocol for Protocol1 {
     fn client(&self) -> u64 {
         self.session.client
     }
@@ -176,7 +176,7 @@ impl Talk for Protocol1 {
         self.session.due()
     }
 
-    fn telemetry(&mut self, lost: u64, look: &mut Look) -> String {
+    fn telemetry(&mut self, lost: u64, look: &mut StatusText) -> String {
         reply::telemetry(look.text(|| self.hub.status()), lost)
     }
 

@@ -6,13 +6,13 @@ use std::time::Instant;
 
 use serde_json::{Map, Value, json};
 
-use super::clerk::Clerk;
-use super::desk::{Answered, Desk, From};
+use super::disk_work::DiskWork;
+use super::dispatcher::{Answered, Dispatcher, RequestId};
 use super::request::{Asked, read};
 use super::words::word_of;
 use crate::grbl::{Sender, Settings};
 use crate::operator::{
-    Answer, House, Lease, Look, MAX_OWNERS, News, Problem, Rhythm, Role, Talk, Tokens,
+    Answer, Lease, MAX_OWNERS, News, Problem, Protocol, Rhythm, Role, Service, StatusText, Tokens,
 };
 
 /// The protocol's number, in the greeting.
@@ -27,53 +27,54 @@ const MAX_BEHIND_BYTES: usize = 32 << 20;
 const MAX_A_ROUND: usize = 8;
 /// Lowest and highest rate of a subscription, Hz.
 const RATES_HZ: std::ops::RangeInclusive<f64> = 0.01..=100.0;
-/// Who lives behind the doors of a controller.
-pub struct Office {
-    pub desk: Arc<Desk>,
+/// The service of a controller.
+pub struct ControllerService {
+    pub dispatcher: Arc<Dispatcher>,
     /// How senders of grbl's protocol are told.
     pub settings: Arc<Settings>,
 }
 
-impl House for Office {
-    fn newcomer(&self, number: u64, tokens: Option<Arc<Tokens>>) -> Box<dyn Talk> {
+impl Service for ControllerService {
+    fn new_client(&self, number: u64, tokens: Option<Arc<Tokens>>) -> Box<dyn Protocol> {
         Box::new(Protocol2 {
-            desk: Arc::clone(&self.desk),
+            dispatcher: Arc::clone(&self.dispatcher),
             client: number,
             tokens,
             has_place: true,
             role: Role::SetUp,
             subscription: None,
-            clerk: Some(Clerk::new(Arc::clone(&self.desk))),
+            disk: Some(DiskWork::new(Arc::clone(&self.dispatcher))),
             behind: VecDeque::new(),
             behind_bytes: 0,
             brings: false,
         })
     }
 
-    fn sender(&self, number: u64, place: &str) -> Option<Box<dyn Talk>> {
-        let (desk, settings) = (Arc::clone(&self.desk), Arc::clone(&self.settings));
-        let sender = Sender::new(desk, settings, number, place).with_clerk();
+    fn sender(&self, number: u64, place: &str) -> Option<Box<dyn Protocol>> {
+        let dispatcher = Arc::clone(&self.dispatcher);
+        let settings = Arc::clone(&self.settings);
+        let sender = Sender::new(dispatcher, settings, number, place).with_disk_work();
         Some(Box::new(sender.greeted_after(Instant::now())))
     }
 
     fn set_clients(&self, _count: usize) {}
 
     fn post(&self) -> Vec<(Option<u64>, String)> {
-        self.desk.take_post()
+        self.dispatcher.take_post()
     }
 
     fn frames(&self) -> Vec<(u64, String)> {
-        self.desk.take_frames()
+        self.dispatcher.take_frames()
     }
 
     fn bell(&self) -> Option<&std::os::unix::net::UnixStream> {
-        Some(self.desk.bell())
+        Some(self.dispatcher.bell())
     }
 }
 
 /// A client of a controller.
 pub struct Protocol2 {
-    desk: Arc<Desk>,
+    dispatcher: Arc<Dispatcher>,
     client: u64,
     /// Until it has named one of them.
     tokens: Option<Arc<Tokens>>,
@@ -81,7 +82,7 @@ pub struct Protocol2 {
     role: Role,
     subscription: Option<Subscription>,
     /// Waits for disks; none where everything is done in lockstep.
-    clerk: Option<Clerk>,
+    disk: Option<DiskWork>,
     /// What came behind a request that waits for a disk.
     behind: VecDeque<Waiting>,
     behind_bytes: usize,
@@ -109,15 +110,15 @@ struct Subscription {
 
 impl Protocol2 {
     /// A client that needs no token.
-    pub fn known(desk: Arc<Desk>, client: u64) -> Self {
+    pub fn known(dispatcher: Arc<Dispatcher>, client: u64) -> Self {
         Self {
-            desk,
+            dispatcher,
             client,
             tokens: None,
             has_place: true,
             role: Role::SetUp,
             subscription: None,
-            clerk: None,
+            disk: None,
             behind: VecDeque::new(),
             behind_bytes: 0,
             brings: false,
@@ -128,16 +129,16 @@ impl Protocol2 {
         let greeting = json!({ "tandem": {
             "protocol": PROTOCOL,
             "version": env!("CARGO_PKG_VERSION"),
-            "machine": self.desk.machine.name,
+            "machine": self.dispatcher.machine.name,
             "client": self.client,
-            "state": self.desk.state().name(),
+            "state": self.dispatcher.state().name(),
             "role": self.role.name(),
         } });
         format!("{greeting}\n")
     }
 
     fn refused(&self, id: Option<u64>, why: &str) -> String {
-        let state = self.desk.state().name();
+        let state = self.dispatcher.state().name();
         format!(
             "{}\n",
             json!({ "id": id, "error": { "what": "refused", "why": why, "state": state } })
@@ -155,12 +156,13 @@ impl Protocol2 {
         };
         match self.tokens.as_ref().and_then(|all| all.role_of(given)) {
             Some(role) if self.has_place => {
-                (self.tokens, self.role) = (None, role);
+                self.tokens = None;
+                self.role = role;
                 if role != Role::SetUp {
                     // The token is for nobody else to read; what it allows is said by this.
                     let says =
                         json!({ "id": asked.id, "request": "role", "as": role.name() }).to_string();
-                    self.desk.note(|all| all.line(self.client, &says));
+                    self.dispatcher.note(|all| all.line(self.client, &says));
                 }
                 Answer {
                     line: self.greeting_line(),
@@ -212,7 +214,7 @@ impl Protocol2 {
             "token" => return Some(Err("no token is asked for here".to_string())),
             _ => {}
         }
-        let stops = self.desk.stops();
+        let stops = self.dispatcher.stops();
         if !self.is_busy() || asked.is_stop() {
             return self.begin(asked, stops);
         }
@@ -232,24 +234,24 @@ impl Protocol2 {
 
     /// Does it here, or has it done where a disk is waited for.
     fn begin(&mut self, asked: Asked, stops: u64) -> Answered {
-        let from = From {
+        let from = RequestId {
             client: self.client,
             id: asked.id,
         };
         self.brings |= asked.request == "upload";
-        let clerk = self
-            .clerk
+        let disk = self
+            .disk
             .as_ref()
-            .filter(|_| self.desk.waits_for_disk(&asked));
-        let Some(clerk) = clerk else {
-            return self.desk.ask_since(from, &asked, stops);
+            .filter(|_| self.dispatcher.waits_for_disk(&asked));
+        let Some(disk) = disk else {
+            return self.dispatcher.ask_since(from, &asked, stops);
         };
-        let begun = clerk.give(move |desk| {
-            let defect = Defect(desk, from);
-            let answer = desk.ask_since(from, &asked, stops);
+        let begun = disk.give(move |dispatcher| {
+            let defect = Defect(dispatcher, from);
+            let answer = dispatcher.ask_since(from, &asked, stops);
             std::mem::forget(defect);
             if let Some(answer) = answer {
-                desk.answer(from, answer);
+                dispatcher.answer(from, answer);
             }
         });
         (!begun).then(|| Err("the computer has no thread that waits for the disk".to_string()))
@@ -310,7 +312,7 @@ impl Protocol2 {
             .iter()
             .map(ToString::to_string)
             .collect();
-        let status = self.desk.status();
+        let status = self.dispatcher.status();
         if let Some(none) = fields.iter().find(|field| status.get(field).is_none()) {
             return Err(format!("the status has no field \"{none}\""));
         }
@@ -346,7 +348,7 @@ impl Subscription {
     }
 }
 
-impl Talk for Protocol2 {
+impl Protocol for Protocol2 {
     fn client(&self) -> u64 {
         self.client
     }
@@ -377,14 +379,15 @@ impl Talk for Protocol2 {
         if !self.is_known() {
             return self.introduce(asked.as_ref().ok());
         }
-        self.desk.note(|all| all.line(self.client, text));
+        self.dispatcher.note(|all| all.line(self.client, text));
         let line = match asked {
             Err((id, why)) => format!(
                 "{}\n",
                 json!({ "id": id, "error": { "what": "malformed line", "why": why } })
             ),
             Ok(asked) => {
-                let (id, steps_down) = (asked.id, asked.request == "role");
+                let id = asked.id;
+                let steps_down = asked.request == "role";
                 let answer = self.grant(asked, text.len(), lease, now);
                 let is_done = matches!(answer, Some(Ok(_)));
                 let line = self.answer_line(id, answer);
@@ -399,13 +402,13 @@ impl Talk for Protocol2 {
     }
 
     fn is_busy(&self) -> bool {
-        !self.behind.is_empty() || self.clerk.as_ref().is_some_and(Clerk::is_busy)
+        !self.behind.is_empty() || self.disk.as_ref().is_some_and(DiskWork::is_busy)
     }
 
     fn turn(&mut self, _lease: &mut Lease, _now: Instant) -> String {
         let mut said = String::new();
         for _ in 0..MAX_A_ROUND {
-            if self.clerk.as_ref().is_some_and(Clerk::is_busy) {
+            if self.disk.as_ref().is_some_and(DiskWork::is_busy) {
                 break;
             }
             let Some(next) = self.behind.pop_front() else {
@@ -440,7 +443,7 @@ impl Talk for Protocol2 {
 
     fn due(&self) -> Option<Instant> {
         // What has waited is gone on with at once; the end of what waits for a disk rings.
-        let waits = self.clerk.as_ref().is_some_and(Clerk::is_busy) || self.behind.is_empty();
+        let waits = self.disk.as_ref().is_some_and(DiskWork::is_busy) || self.behind.is_empty();
         let now = (!waits).then(Instant::now);
         [now, self.subscription.as_ref().map(|of| of.rhythm.due())]
             .into_iter()
@@ -448,13 +451,13 @@ impl Talk for Protocol2 {
             .min()
     }
 
-    fn telemetry(&mut self, lost: u64, look: &mut Look) -> String {
+    fn telemetry(&mut self, lost: u64, look: &mut StatusText) -> String {
         match &mut self.subscription {
             Some(of) if of.picks() => {
-                let picked = of.pick(self.desk.status());
+                let picked = of.pick(self.dispatcher.status());
                 status_line(lost, &picked.to_string())
             }
-            _ => status_line(lost, look.text(|| self.desk.shown())),
+            _ => status_line(lost, look.text(|| self.dispatcher.shown())),
         }
     }
 
@@ -495,23 +498,23 @@ pub fn frame_line(lost: u64, frame: &str) -> String {
 
 impl Drop for Protocol2 {
     fn drop(&mut self) {
-        self.desk.scope().forget(self.client);
-        self.desk.note(|all| all.leaves(self.client));
+        self.dispatcher.scope().forget(self.client);
+        self.dispatcher.note(|all| all.leaves(self.client));
         if !self.brings {
             return;
         }
         let client = self.client;
-        let forget = move |desk: &Desk| desk.forget_upload(client);
-        match &self.clerk {
+        let forget = move |dispatcher: &Dispatcher| dispatcher.forget_upload(client);
+        match &self.disk {
             // Without a thread it stays where it is until the next one of its name.
-            Some(clerk) => _ = clerk.give(forget),
-            None => forget(&self.desk),
+            Some(disk) => _ = disk.give(forget),
+            None => forget(&self.dispatcher),
         }
     }
 }
 
 /// Answers a request whose doing has failed in a way that nobody has foreseen.
-struct Defect<'a>(&'a Desk, From);
+struct Defect<'a>(&'a Dispatcher, RequestId);
 
 impl Drop for Defect<'_> {
     fn drop(&mut self) {

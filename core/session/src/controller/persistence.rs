@@ -1,10 +1,11 @@
-//! Who keeps what lasts, where a killed process does not lose it.
+//! Where what lasts is kept, so that a killed process does not lose it.
 
 use std::collections::BTreeMap;
 
 use tandem_state::{Alarm, Change, Driven, Job, Store};
 
-use super::history::HELD;
+/// Jobs and alarms that are held ready for clients; a state file keeps more.
+pub const HELD: usize = 100;
 
 /// What a process finds from those before it, beside offsets, parameters and tools.
 #[derive(Clone, Debug, Default)]
@@ -19,8 +20,8 @@ pub struct Remembered {
     pub policy_parameters: BTreeMap<String, f64>,
 }
 
-/// Keeps what lasts. No method but [`Keeper::commit`] waits for a disk.
-pub trait Keeper: Send + Sync {
+/// Keeps what lasts. No method but [`Persistence::commit`] waits for a disk.
+pub trait Persistence: Send + Sync {
     /// Keeps what a client has asked for: it is safe when this returns.
     ///
     /// # Errors
@@ -45,9 +46,9 @@ pub trait Keeper: Send + Sync {
 }
 
 /// Keeps nothing: what lasts ends with the process.
-pub struct NoKeeper;
+pub struct NoPersistence;
 
-impl Keeper for NoKeeper {
+impl Persistence for NoPersistence {
     fn commit(&self, _changes: Vec<Change>) -> Result<(), String> {
         Ok(())
     }
@@ -55,7 +56,7 @@ impl Keeper for NoKeeper {
     fn record(&self, _change: Change) {}
 }
 
-impl Keeper for Store {
+impl Persistence for Store {
     fn commit(&self, changes: Vec<Change>) -> Result<(), String> {
         Self::commit(self, changes).map_err(|e| e.to_string())
     }

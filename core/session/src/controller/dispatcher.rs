@@ -1,4 +1,4 @@
-//! Where all requests come together: what is true of the machine and its jobs, and who is told of it.
+//! Requests of all clients: what is true of the machine and its jobs, and who is told of it.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -22,9 +22,9 @@ use tandem_state::{Change, Outcome};
 use super::arrivals::Arrivals;
 use super::described;
 use super::history::{History, alarm_shown};
-use super::keeper::Keeper;
 use super::lines::{Judged, SharedLines, lock};
 use super::path::DrawnPath;
+use super::persistence::Persistence;
 use super::programs::Upload;
 use super::scope::Scope;
 use super::states::ControllerState;
@@ -62,7 +62,7 @@ impl Mode {
 
 /// Who asked, and for which answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct From {
+pub struct RequestId {
     pub client: u64,
     pub id: u64,
 }
@@ -72,32 +72,32 @@ pub struct From {
 pub enum Order {
     /// Checks a program, and keeps it for a start where that is asked for.
     Check {
-        from: From,
+        from: RequestId,
         program: Loaded,
         load: bool,
     },
     Start {
-        from: From,
+        from: RequestId,
     },
     Mdi,
     /// Lines that are jogs.
     JogLines,
     Jog,
     Home {
-        from: From,
+        from: RequestId,
         axis: Option<usize>,
     },
     /// Not where an emergency stop has been asked for since, of which there had been so many.
     Enable {
-        from: From,
+        from: RequestId,
         resets: bool,
         emergency_stops: u64,
     },
     Disable {
-        from: From,
+        from: RequestId,
     },
     SetPolicyParameter {
-        from: From,
+        from: RequestId,
         name: String,
         value: f64,
     },
@@ -105,7 +105,7 @@ pub enum Order {
 
 impl Order {
     /// Who is answered when it has begun, or will not.
-    pub fn from(&self) -> Option<From> {
+    pub fn from(&self) -> Option<RequestId> {
         match self {
             Self::Check { from, .. }
             | Self::Start { from }
@@ -182,7 +182,8 @@ impl Loaded {
                 *at += line.len();
                 Some(start)
             });
-        let (mut marks, mut lines) = (vec![], 0);
+        let mut marks = vec![];
+        let mut lines = 0;
         for (number, start) in starts.enumerate() {
             if number.is_multiple_of(LINES_PER_MARK) {
                 marks.push(start);
@@ -237,12 +238,12 @@ pub struct Seen {
     pub switched: Switched,
 }
 
-/// What lasts, as far as clients change it.
+/// Whether a change of what lasts, that a client has asked for, is being written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Books {
-    Closed,
+pub enum StateWrite {
+    Idle,
     /// It is being written: nothing is begun meanwhile.
-    Written,
+    UnderWay,
 }
 
 /// What is asked for, and what became of it.
@@ -260,7 +261,7 @@ pub struct Inner {
     pub stops: u64,
     /// So many of them are emergency stops.
     pub emergency_stops: u64,
-    pub books: Books,
+    pub state_write: StateWrite,
     pub history: History,
     /// Parameters of the policy script, as the next job has them.
     pub policy_parameters: BTreeMap<String, f64>,
@@ -270,14 +271,14 @@ pub struct Inner {
     last_state: Option<(ControllerState, bool)>,
 }
 
-/// The desk.
-pub struct Desk {
+/// What clients and the loop that drives share: each request is judged and answered here, and becomes an order of that loop.
+pub struct Dispatcher {
     pub machine: Machine,
     pub hub: Arc<OperatorHub>,
     pub status: Arc<Status>,
     pub lines: SharedLines,
     pub jogs: Arc<JogController>,
-    pub keeper: Box<dyn Keeper>,
+    pub persistence: Box<dyn Persistence>,
     pub programs: Option<PathBuf>,
     /// The drives are on a bus, whose frames may be late or lost.
     pub has_bus: bool,
@@ -286,12 +287,12 @@ pub struct Desk {
     inner: Mutex<Inner>,
     pub(super) upload: Mutex<Option<Upload>>,
     /// Threads that wait for a disk.
-    pub(super) clerks: Arc<AtomicUsize>,
+    pub(super) disk_threads: Arc<AtomicUsize>,
     path: Mutex<DrawnPath>,
     scope: Mutex<Scope>,
     seen: Mutex<Seen>,
     frames: Mutex<Vec<(u64, String)>>,
-    /// What lasts, as it was given to the keeper last.
+    /// What lasts, as it was last made persistent.
     kept: Mutex<Option<Lasting>>,
     /// On the virtual clock the time, ms; below zero where the computer's clock says.
     replay_ms: AtomicI64,
@@ -303,7 +304,7 @@ pub struct Desk {
 /// The answer to a request: at once, or once the loop that drives has looked at it.
 pub type Answered = Option<Result<Value, String>>;
 
-impl Desk {
+impl Dispatcher {
     #[allow(clippy::too_many_arguments)] // the parts of a controller, each once
     pub fn new(
         machine: &Machine,
@@ -311,7 +312,7 @@ impl Desk {
         status: Arc<Status>,
         lines: SharedLines,
         jogs: Arc<JogController>,
-        keeper: Box<dyn Keeper>,
+        persistence: Box<dyn Persistence>,
         programs: Option<PathBuf>,
         unknown_axes: u32,
     ) -> Result<Self, String> {
@@ -330,8 +331,8 @@ impl Desk {
             aborting: false,
             stops: 0,
             emergency_stops: 0,
-            books: Books::Closed,
-            history: History::of(&keeper.remembered()),
+            state_write: StateWrite::Idle,
+            history: History::of(&persistence.remembered()),
             policy_parameters: BTreeMap::new(),
             declared_parameters: vec![],
             last_state: None,
@@ -342,13 +343,13 @@ impl Desk {
             status,
             lines,
             jogs,
-            keeper,
+            persistence,
             programs,
             has_bus: false,
             arrivals: None,
             inner: Mutex::new(inner),
             upload: Mutex::default(),
-            clerks: Arc::default(),
+            disk_threads: Arc::default(),
             path: Mutex::new(DrawnPath::new(machine.axes)),
             scope: Mutex::new(Scope::new(machine)),
             seen: Mutex::default(),
@@ -410,7 +411,7 @@ impl Desk {
     pub fn keep(&self, lasting: Lasting) {
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         if kept.as_ref() != Some(&lasting) {
-            self.keeper
+            self.persistence
                 .record(Change::Program(Arc::new(lasting.clone())));
             *kept = Some(lasting);
         }
@@ -474,7 +475,7 @@ impl Desk {
     }
 
     /// Answers a request that was answered later.
-    pub fn answer(&self, from: From, answer: Result<Value, String>) {
+    pub fn answer(&self, from: RequestId, answer: Result<Value, String>) {
         let line = match answer {
             Ok(ok) => json!({ "id": from.id, "ok": ok }),
             Err(why) => {
@@ -560,11 +561,13 @@ impl Desk {
     #[must_use]
     pub fn begin_enabling(&self, emergency_stops: u64) -> bool {
         let mut inner = self.lock();
-        (inner.order, inner.aborting) = (None, false);
+        inner.order = None;
+        inner.aborting = false;
         if inner.emergency_stops != emergency_stops {
             return false;
         }
-        (inner.fault, inner.mode) = (None, Mode::Enabling);
+        inner.fault = None;
+        inner.mode = Mode::Enabling;
         // Clients ask for one under this lock: it is in force before this, and counted, or behind it.
         let stop = &self.hub.controls().emergency_stop;
         stop.store(false, Relaxed);
@@ -593,7 +596,7 @@ impl Desk {
         self.tell_state();
     }
 
-    /// A job is over, whose lines are settled and whose place is shown from here on; [`Desk::close`] follows. The loop that drives.
+    /// A job is over, whose lines are settled and whose place is shown from here on; [`Dispatcher::close`] follows. The loop that drives.
     pub fn settle(&self, mode: Mode, outcome: &JobOutcome) {
         let whole = outcome.fault.is_none() && !outcome.aborted;
         // A jog that was let go has switched nothing off.
@@ -607,7 +610,8 @@ impl Desk {
         self.tell_driven(&driven, whole);
         let lasting = lock(&self.lines).standing().lasting();
         self.keep(lasting);
-        self.keeper.record(Change::LastPosition(outcome.position));
+        self.persistence
+            .record(Change::LastPosition(outcome.position));
         self.hub.stands_at(&outcome.position);
         self.path().drive(&outcome.position);
         self.send_scope(true);
@@ -657,7 +661,8 @@ impl Desk {
             vec![]
         };
         self.stands(&outcome.position, unknown_axes);
-        (inner.mode, inner.unknown_axes) = (Mode::Idle, unknown_axes);
+        inner.mode = Mode::Idle;
+        inner.unknown_axes = unknown_axes;
         self.forget_abort(&mut inner);
         if self.ask_again(late) && inner.order.is_none() {
             inner.order = Some(Order::Jog);
@@ -666,7 +671,7 @@ impl Desk {
         drop(inner);
         if let Some((id, end)) = ended {
             let end = Box::new(end);
-            self.keeper.record(Change::JobEnded { id, end });
+            self.persistence.record(Change::JobEnded { id, end });
             let job = json!({
                 "number": id, "job": mode.name(), "name": name, "outcome": how.word(), "fault": fault,
                 "blocks": outcome.summary.blocks, "time_s": outcome.summary.motion_time_s, "stopped": outcome.summary.stopped,
@@ -716,7 +721,7 @@ impl Desk {
             None,
             &json!({ "event": "alarm", "raised": alarm_shown(&alarm) }),
         );
-        self.keeper.record(Change::Raised(Box::new(alarm)));
+        self.persistence.record(Change::Raised(Box::new(alarm)));
         self.hub.begin_fault(words);
     }
 

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use axum::http::header::{HOST, ORIGIN, SEC_WEBSOCKET_PROTOCOL};
 use axum::http::{HeaderMap, HeaderName, Uri};
 
-/// Says how a token opens the door; none where it does not. Thread of the server; waits for nothing.
-pub type Admits = Arc<dyn Fn(&str) -> Option<Entry> + Send + Sync>;
+/// Says how a page with a token reaches the controller; none where the token is not accepted. Thread of the server; waits for nothing.
+pub type TokenCheck = Arc<dyn Fn(&str) -> Option<Entry> + Send + Sync>;
 
 /// How a page comes to the controller.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -24,15 +24,15 @@ const TOKEN_PREFIX: &str = "token.";
 
 /// Judges requests by their headers.
 #[derive(Clone)]
-pub struct Doorkeeper {
+pub struct AccessCheck {
     /// Names with port, in small letters, as `Host` has them.
     hosts: Arc<[String]>,
-    admits: Admits,
+    tokens: TokenCheck,
 }
 
-impl Doorkeeper {
+impl AccessCheck {
     /// For a server at `address`, which is also reached by `names` (with or without a port of their own). Allocates.
-    pub fn new(address: SocketAddr, names: &[String], admits: Admits) -> Self {
+    pub fn new(address: SocketAddr, names: &[String], tokens: TokenCheck) -> Self {
         let port = address.port();
         let mut hosts = vec![];
         let own = [
@@ -57,7 +57,7 @@ impl Doorkeeper {
         }
         Self {
             hosts: hosts.into(),
-            admits,
+            tokens,
         }
     }
 
@@ -106,7 +106,7 @@ impl Doorkeeper {
     /// Why it is refused.
     pub fn token(&self, digits: &str) -> Result<Entry, &'static str> {
         text_of(digits)
-            .and_then(|token| (self.admits)(&token))
+            .and_then(|token| (self.tokens)(&token))
             .ok_or("the token is another one: open the address that tandem serve has printed last")
     }
 
@@ -136,10 +136,10 @@ fn text_of(digits: &str) -> Option<String> {
 mod tests {
     use super::*;
 
-    fn keeper(port: u16, names: &[&str]) -> Doorkeeper {
+    fn access(port: u16, names: &[&str]) -> AccessCheck {
         let names: Vec<String> = names.iter().map(ToString::to_string).collect();
         let address = SocketAddr::from(([127, 0, 0, 1], port));
-        Doorkeeper::new(
+        AccessCheck::new(
             address,
             &names,
             Arc::new(|token| (token == "abc").then(Entry::default)),
@@ -154,7 +154,7 @@ mod tests {
 
     #[test]
     fn a_foreign_name_is_refused_though_it_leads_here() {
-        let keeper = keeper(8080, &["mill.local", "proxy.example:443"]);
+        let access = access(8080, &["mill.local", "proxy.example:443"]);
         let uri = Uri::from_static("/");
         for own in [
             "127.0.0.1:8080",
@@ -163,7 +163,7 @@ mod tests {
             "mill.local:8080",
             "proxy.example:443",
         ] {
-            assert_eq!(keeper.host(&uri, &headers(&[(HOST, own)])), Ok(()), "{own}");
+            assert_eq!(access.host(&uri, &headers(&[(HOST, own)])), Ok(()), "{own}");
         }
         for foreign in [
             "evil.example:8080",
@@ -174,17 +174,17 @@ mod tests {
             "",
         ] {
             assert!(
-                keeper.host(&uri, &headers(&[(HOST, foreign)])).is_err(),
+                access.host(&uri, &headers(&[(HOST, foreign)])).is_err(),
                 "{foreign}"
             );
         }
         let twice = headers(&[(HOST, "127.0.0.1:8080"), (HOST, "evil.example")]);
         assert!(
-            keeper.host(&uri, &twice).is_err() && keeper.host(&uri, &HeaderMap::new()).is_err()
+            access.host(&uri, &twice).is_err() && access.host(&uri, &HeaderMap::new()).is_err()
         );
         let absolute = Uri::from_static("http://evil.example/");
         assert!(
-            keeper
+            access
                 .host(&absolute, &headers(&[(HOST, "127.0.0.1:8080")]))
                 .is_err()
         );
@@ -194,7 +194,7 @@ mod tests {
     fn a_browser_leaves_the_usual_port_out() {
         let uri = Uri::from_static("/");
         assert!(
-            keeper(80, &[])
+            access(80, &[])
                 .host(&uri, &headers(&[(HOST, "localhost")]))
                 .is_ok()
         );
@@ -202,9 +202,9 @@ mod tests {
 
     #[test]
     fn a_socket_needs_a_page_of_this_server_and_the_token() {
-        let keeper = keeper(8080, &[]);
+        let access = access(8080, &[]);
         let with = |origin: &str, offered: &str| {
-            keeper.socket(&headers(&[
+            access.socket(&headers(&[
                 (ORIGIN, origin),
                 (SEC_WEBSOCKET_PROTOCOL, offered),
             ]))
@@ -231,7 +231,7 @@ mod tests {
             assert!(with(own, offered).is_err(), "{offered}");
         }
         assert!(
-            keeper
+            access
                 .socket(&headers(&[(SEC_WEBSOCKET_PROTOCOL, right)]))
                 .is_err()
         );

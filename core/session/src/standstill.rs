@@ -2,9 +2,9 @@
 
 /// How often in a row the rough loop has found everything driven.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Standing(u32);
+pub struct Standstill(u32);
 
-impl Standing {
+impl Standstill {
     /// Once is not enough: the fine loop says so once a period, and may have taken a segment since.
     const TIMES: u32 = 2;
 
