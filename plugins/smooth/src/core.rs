@@ -5,13 +5,12 @@ use tandem_motion::stream::{Blocks, Emitted, Next, Planned, Stream, Windows};
 use tandem_motion::tube::Lanes;
 use tandem_sdk::{AxisVector, Block, Curve, PlannerContext, PluginError, SegmentSink};
 
-use crate::emit::DrivenPath;
 use crate::flatten::{self, Flat};
 use crate::frame::Frame;
-use crate::plan::{Effort, Planning, Start, Tuning};
+use crate::plan::{Effort, Planning, Tuning};
 use crate::profile;
 use crate::route::{Item, Route};
-use crate::window::{Piece, State, Window};
+use crate::window::{Piece, Start, State, Window};
 
 /// Part of a window in which it may be left for the next. Left at 0.40 of it at the latest, the programs of docs/smooth-planner.md
 /// take 6 to 13 % longer.
@@ -51,6 +50,23 @@ pub struct PathAhead<const L: usize> {
     pub(crate) position: Lanes<L>,
     /// Least time that the blocks held take, s.
     pub(crate) held_s: f64,
+}
+
+/// The path coordinate of what was emitted.
+#[derive(Debug, Default)]
+pub struct DrivenPath {
+    /// Length driven, mm.
+    pub path_mm: f64,
+    /// Path coordinate polynomial of the piece at `piece`, mm.
+    pub(crate) path: [f64; 6],
+    pub(crate) piece: Option<usize>,
+}
+
+impl DrivenPath {
+    /// Another window begins.
+    pub fn begin_window(&mut self) {
+        self.piece = None;
+    }
 }
 
 /// What the planner for any number of axes asks of one.
@@ -100,19 +116,19 @@ impl<const L: usize> PathAhead<L> {
 
     /// A block too short to be a motion: it begins and ends.
     fn skip(&mut self, blocks: &mut Blocks, sink: &mut dyn SegmentSink) {
-        if let Some(Item::Leg(leg)) = self.route.pop() {
-            self.held_s -= leg.min_s;
-            if !blocks.is_reported(&leg.block) {
-                let index = leg.block.index;
+        if let Some(Item::Motion(queued)) = self.route.pop() {
+            self.held_s -= queued.min_s;
+            if !blocks.is_reported(&queued.block) {
+                let index = queued.block.index;
                 blocks.report(
                     &report(index, tandem_sdk::LimitedBy::Acceleration, [0.0; 3], 0.0),
                     sink,
                 );
             }
-            self.position = self.frame.lanes(&leg.block.end);
+            self.position = self.frame.lanes(&queued.block.end);
             blocks.rest(
-                BlockId::from(&leg.block),
-                &leg.block.end,
+                BlockId::from(&queued.block),
+                &queued.block.end,
                 self.driven.path_mm,
                 sink,
             );
@@ -230,11 +246,11 @@ impl<const L: usize> Windows for PathAhead<L> {
                 self.position = self.frame.lanes(&block.end);
                 Next::Dwell(block, self.driven.path_mm)
             }
-            Some(Item::Leg(leg)) if leg.end <= self.at + 1e-12 => {
+            Some(Item::Motion(queued)) if queued.end <= self.at + 1e-12 => {
                 self.skip(blocks, sink);
                 Next::Again
             }
-            Some(Item::Leg(_)) => Next::Path,
+            Some(Item::Motion(_)) => Next::Path,
         }
     }
 

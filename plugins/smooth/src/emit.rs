@@ -6,28 +6,18 @@ use tandem_sdk::{MAX_AXES, Segment, SegmentFlags, SegmentSink};
 
 use crate::core::PathAhead;
 use crate::frame::{dot, minus};
-use crate::report::{of_leg, path};
-use crate::route::{Item, Leg};
+use crate::report::{of_block, path};
+use crate::route::{Item, QueuedBlock};
 
 /// Share of the jerk limits on which a stop counts: the plan takes the rest.
 const STOP_JERK: f64 = 0.5;
 /// Least duration of a segment, s: the derivatives of a shorter one are rounding.
 const MIN_S: f64 = 5e-5;
-/// Fine periods by which the marks may be off where the motion passes the end of a leg. Where feeds are nearly the same it may be as
+/// Fine periods by which the marks may be off where the motion passes the end of a block. Where feeds are nearly the same it may be as
 /// early or late as half a box is long; a motion that takes longer for that has hardly any speed there.
 const MAX_OFF_PERIODS: usize = 256;
 /// Halvings of the period in which the motion passes that end.
 const HALVINGS: usize = 30;
-
-/// The path coordinate of what was emitted.
-#[derive(Debug, Default)]
-pub struct DrivenPath {
-    /// Length driven, mm.
-    pub path_mm: f64,
-    /// Path coordinate polynomial of the piece at `piece`, mm.
-    path: [f64; 6],
-    piece: Option<usize>,
-}
 
 /// What is left of blocks that share a segment.
 #[derive(Clone, Copy, Debug)]
@@ -54,21 +44,15 @@ impl Shared {
     }
 }
 
-impl DrivenPath {
-    /// Another window begins.
-    pub fn begin_window(&mut self) {
-        self.piece = None;
-    }
-}
-
 impl<const L: usize> PathAhead<L> {
-    /// Least time of the part of the leg in front that is driven when `driven_s` of the window are, s.
+    /// Least time of the part of the block in front that is driven when `driven_s` of the window are, s.
     pub(crate) fn front_driven_s(&self, driven_s: f64) -> f64 {
-        let Some(leg) = self.route.front() else {
+        let Some(queued) = self.route.front() else {
             return 0.0;
         };
-        let share = (self.window.along(driven_s) - leg.start) / (leg.end - leg.start).max(1e-12);
-        leg.min_s * share.clamp(0.0, 1.0)
+        let share =
+            (self.window.along(driven_s) - queued.start) / (queued.end - queued.start).max(1e-12);
+        queued.min_s * share.clamp(0.0, 1.0)
     }
 
     /// Emits a segment: to the end of the piece, of the block, or of `left_s`.
@@ -87,18 +71,18 @@ impl<const L: usize> PathAhead<L> {
         }
         let mut shared: Option<Shared> = None;
         let mut ends = false;
-        while let Some(leg) = self.route.front() {
-            let end_s = if leg.end < self.window.end() - 1e-9 {
-                self.over_s(leg.end)
+        while let Some(queued) = self.route.front() {
+            let end_s = if queued.end < self.window.end() - 1e-9 {
+                self.over_s(queued.end)
             } else {
                 f64::INFINITY
             };
-            self.begin_leg(from_s, end_s, blocks, sink);
+            self.begin_report(from_s, end_s, blocks, sink);
             // Blocks of which less than a fine period is left share a segment, which is named by the last of them.
             let another = self.route.items.len() > 1;
             if end_s < from_s + period_s && another {
                 shared = Some(Shared::with(shared, blocks.blank.feed_mm_per_s, end_s));
-                self.pop_leg();
+                self.pop_front();
                 continue;
             }
             // At a low rate a fine period of program time lasts for many samples: where feeds differ, the segment has the lowest of
@@ -122,7 +106,7 @@ impl<const L: usize> PathAhead<L> {
         }
         if ends {
             segment.flags = segment.flags.with(SegmentFlags::BLOCK_ENDS);
-            self.pop_leg();
+            self.pop_front();
         }
         blocks.has_begun();
         segment.duration_s = until_s - from_s;
@@ -133,8 +117,8 @@ impl<const L: usize> PathAhead<L> {
         }
     }
 
-    /// When the motion is over the leg in front, which ends at the path coordinate `end`. Between two marks that is an even pace, and the
-    /// motion may be periods off; where the feed is another one behind it, it is when the motion passes the end of the leg. What the
+    /// When the motion is over the block in front, which ends at the path coordinate `end`. Between two marks that is an even pace, and the
+    /// motion may be periods off; where the feed is another one behind it, it is when the motion passes the end of the block. What the
     /// feed of a segment bounds is then on the block that has it.
     fn over_s(&self, end: f64) -> f64 {
         let about_s = self.window.time_of(end);
@@ -171,35 +155,41 @@ impl<const L: usize> PathAhead<L> {
         about_s
     }
 
-    /// Gives the report of the leg in front, where that was not done.
-    fn begin_leg(&self, from_s: f64, end_s: f64, blocks: &mut Blocks, sink: &mut dyn SegmentSink) {
-        let Some(leg) = self.route.front() else {
+    /// Gives the report of the block in front, where that was not done.
+    fn begin_report(
+        &self,
+        from_s: f64,
+        end_s: f64,
+        blocks: &mut Blocks,
+        sink: &mut dyn SegmentSink,
+    ) {
+        let Some(queued) = self.route.front() else {
             return;
         };
-        if blocks.is_reported(&leg.block) {
+        if blocks.is_reported(&queued.block) {
             return;
         }
         let to_s = end_s.min(self.window.duration_s()).max(from_s);
-        let start_s = self.window.time_of(leg.start).min(from_s).min(to_s);
-        let report = of_leg(
+        let start_s = self.window.time_of(queued.start).min(from_s).min(to_s);
+        let report = of_block(
             &self.window,
-            &self.frame.counted(leg.rotary),
-            leg,
+            &self.frame.counted(queued.rotary),
+            queued,
             (start_s, to_s),
         );
-        blocks.begin(&leg.block, &report, sink);
+        blocks.begin(&queued.block, &report, sink);
     }
 
-    fn pop_leg(&mut self) {
-        if let Some(Item::Leg(leg)) = self.route.pop() {
-            self.held_s -= leg.min_s;
+    fn pop_front(&mut self) {
+        if let Some(Item::Motion(queued)) = self.route.pop() {
+            self.held_s -= queued.min_s;
         }
     }
 
     /// The part of piece `k` from `from_s` to `until_s`.
     fn draw(&mut self, k: usize, from_s: f64, until_s: f64, blank: &Segment) -> Segment {
         let piece = &self.window.pieces[k];
-        let rotary = self.route.front().is_some_and(|leg| leg.rotary);
+        let rotary = self.route.front().is_some_and(|queued| queued.rotary);
         if self.driven.piece != Some(k) {
             let counted = self.frame.counted(rotary);
             self.driven.path_mm = path(&counted, piece, self.driven.path_mm, &mut self.driven.path);
@@ -233,12 +223,12 @@ impl<const L: usize> PathAhead<L> {
         let mut exact = self.frame.axes(&self.position);
         let mut named = blocks.present();
         let mut ended = false;
-        while let Some(leg) = self.route.front().filter(|leg| leg.end <= end + 1e-9) {
-            exact = leg.block.end;
+        while let Some(queued) = self.route.front().filter(|queued| queued.end <= end + 1e-9) {
+            exact = queued.block.end;
             ended = true;
-            named = BlockId::from(&leg.block);
-            self.report_last(leg, blocks, sink);
-            self.pop_leg();
+            named = BlockId::from(&queued.block);
+            self.report_last(queued, blocks, sink);
+            self.pop_front();
         }
         if ended {
             self.position = self.frame.lanes(&exact);
@@ -246,14 +236,14 @@ impl<const L: usize> PathAhead<L> {
         blocks.rest(named, &exact, self.driven.path_mm, sink);
     }
 
-    fn report_last(&self, leg: &Leg, blocks: &mut Blocks, sink: &mut dyn SegmentSink) {
-        if !blocks.is_reported(&leg.block) {
+    fn report_last(&self, queued: &QueuedBlock, blocks: &mut Blocks, sink: &mut dyn SegmentSink) {
+        if !blocks.is_reported(&queued.block) {
             let to_s = self.window.duration_s();
-            let from_s = self.window.time_of(leg.start).min(to_s);
-            let report = of_leg(
+            let from_s = self.window.time_of(queued.start).min(to_s);
+            let report = of_block(
                 &self.window,
-                &self.frame.counted(leg.rotary),
-                leg,
+                &self.frame.counted(queued.rotary),
+                queued,
                 (from_s, to_s),
             );
             blocks.report(&report, sink);

@@ -2,11 +2,9 @@
 
 use tandem_motion::tube::{Lanes, Waypoint, each};
 
-use crate::frame::{dot, minus};
-use crate::plan::Start;
+use crate::frame::{dot, larger, minus};
 use crate::route::Run;
-use crate::verify::larger;
-use crate::window::Window;
+use crate::window::{Start, Window};
 
 /// The pace of intervals, asked for in order: the lowest of the chords whose waypoints lie in or next to one. A vertex has both
 /// of its chords: speed at the end of an interval is what the next one allows.

@@ -5,8 +5,7 @@ use tandem_motion::nurbs::{ArcLength, Nurbs, NurbsError, Place};
 use tandem_motion::tube::Lanes;
 use tandem_sdk::{Axes, AxisVector, Block, BlockKind, Curve, NurbsData, PluginError};
 
-use crate::beside::to_chord;
-use crate::frame::{Frame, minus};
+use crate::frame::{Frame, minus, to_chord};
 
 /// Share of the tolerance that chords of a curved block stand off it.
 pub const SAGITTA_SHARE: f64 = 0.015;

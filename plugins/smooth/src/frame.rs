@@ -139,3 +139,25 @@ pub fn largest<const L: usize>(a: &Lanes<L>) -> f64 {
     a.iter()
         .fold(0.0, |most, v| if v.abs() > most { v.abs() } else { most })
 }
+
+/// The larger of two numbers; no number where either is none.
+#[inline(always)]
+pub fn larger(a: f64, b: f64) -> f64 {
+    // Where either is no number, neither is the result.
+    if b > a || b.is_nan() { b } else { a }
+}
+
+/// The squared distance of `point` from the line between `a` and `b`.
+#[inline(always)]
+pub fn to_chord<const L: usize>(point: &Lanes<L>, a: &Lanes<L>, b: &Lanes<L>) -> f64 {
+    let chord = minus(b, a);
+    let way = minus(point, a);
+    let squared = dot(&chord, &chord);
+    let along = if squared > 0.0 {
+        (dot(&way, &chord) / squared).clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
+    let across: Lanes<L> = each(|l| way[l] - along * chord[l]);
+    dot(&across, &across)
+}

@@ -19,7 +19,6 @@
     reason = "lanes of several arrays go side by side"
 )]
 
-mod beside;
 mod core;
 mod emit;
 mod feeds;
@@ -27,6 +26,7 @@ mod flatten;
 mod frame;
 mod options;
 mod order;
+mod path_distance;
 mod peaks;
 mod plan;
 mod planner;

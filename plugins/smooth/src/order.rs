@@ -3,8 +3,8 @@
 
 use tandem_motion::tube::Lanes;
 
-use crate::beside::{ALLOWED, beside, to_chord};
-use crate::frame::{dot, minus};
+use crate::frame::{dot, minus, to_chord};
+use crate::path_distance::{ALLOWED, path_distance};
 use crate::route::{Chord, Run};
 
 /// How far a vertex may be from the samples between which it is passed, in tolerances: a place is the first that a sample may
@@ -36,7 +36,7 @@ impl Order {
         begin: usize,
         (near, end): (usize, f64),
     ) -> bool {
-        let start = beside(run, near, &samples[begin]).path_coordinate(run);
+        let start = path_distance(run, near, &samples[begin]).path_coordinate(run);
         let tolerance = run.chords[run.chord_at(start, near)].tolerance;
         let start = (start - 2.0 * tolerance).max(run.chords[0].s);
         let share = |n: usize| {

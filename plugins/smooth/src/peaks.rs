@@ -7,9 +7,13 @@
 
 use tandem_motion::tube::{Lanes, each};
 
-use crate::frame::{Frame, dot};
-use crate::verify::{ACCELERATION, JERK, SPEED, larger};
+use crate::frame::{Frame, dot, larger};
 use crate::window::{Bound, Piece, Stop};
+
+/// Share of a limit that the motion may reach at an instant.
+pub const SPEED: f64 = 1.0;
+pub const ACCELERATION: f64 = 0.9995;
+pub const JERK: f64 = 1.003;
 
 /// Halvings at most: the hull of a part of a piece of 6 ms is then beyond its jerk by less than a ten-thousandth of a limit.
 const DEPTH: u32 = 8;

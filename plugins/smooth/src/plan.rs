@@ -10,8 +10,8 @@ use crate::route::Run;
 use crate::timing::{FINE_S, Mark, Reach, Timing};
 use crate::travel::Travel;
 use crate::verify::{Checked, Checker};
-use crate::waypoints::{Grid, Keep, Waypoints};
-use crate::window::{Piece, State, Window};
+use crate::waypoints::{Grid, INTERVALS, Keep, Waypoints};
+use crate::window::{Piece, Start, State, Window};
 
 /// Shares of the limits that the solution may take: the rest covers what lies between the places asked. Half or twice of that rest
 /// changes the times of the programs of docs/smooth-planner.md by 1 % at most, to either side.
@@ -25,8 +25,6 @@ const EXTRA: usize = 2;
 const INFEASIBLE: f64 = 0.004;
 /// Intervals behind a start in motion in which smoothing holds jerk down.
 const FIRM_INTERVALS: usize = 12;
-/// Intervals of a window at least and at most.
-pub const INTERVALS: (usize, usize) = (7, 420);
 /// Largest rate squared.
 const MAX_RATE_SQUARED: f64 = 16.0;
 /// Least rate squared: a round makes a motion ten times slower at most.
@@ -87,37 +85,6 @@ impl Tuning {
         let acceleration = frame.largest(&frame.acceleration);
         let between = acceleration * frame.period_s * frame.period_s / 8.0;
         self.box_share * (1.0 - BETWEEN * between / tolerance).max(LEAST)
-    }
-}
-
-/// From where a window is planned, and how far.
-#[derive(Clone, Copy, Debug)]
-pub struct Start<'a, const L: usize> {
-    pub state: State<L>,
-    pub s: f64,
-    pub resting: bool,
-    /// Positions before, a fine period apart.
-    pub before: &'a [Lanes<L>],
-    /// Path coordinate that it may go to at most.
-    pub end: f64,
-    pub window_s: f64,
-    /// The window that it goes on from, and when.
-    pub old: Option<(&'a Window<L>, f64)>,
-}
-
-impl<const L: usize> Start<'_, L> {
-    /// The least tolerance of the path that the window may drive.
-    fn least_tolerance(&self, run: &Run<'_, L>) -> f64 {
-        let mut way_s = 0.0;
-        let mut tolerance = f64::INFINITY;
-        for chord in &run.chords[run.chord_at(self.s, 0)..] {
-            if chord.s > self.end || way_s > self.window_s {
-                break;
-            }
-            tolerance = chord.tolerance.min(tolerance);
-            way_s += chord.length / chord.speed.max(1e-9);
-        }
-        tolerance
     }
 }
 

@@ -4,7 +4,7 @@ use tandem_motion::blocks::{limited_by_feed, report};
 use tandem_motion::tube::Lanes;
 use tandem_sdk::{BlockReport, LimitedBy};
 
-use crate::route::Leg;
+use crate::route::QueuedBlock;
 use crate::window::{Bound, Window};
 
 /// Path speed of a velocity.
@@ -17,12 +17,12 @@ pub fn path_speed<const L: usize>(counted: &Lanes<L>, velocity: &Lanes<L>) -> f6
         .sqrt()
 }
 
-/// The report of the leg that is driven from `from_s` to `to_s` of `window`. Where it goes on beyond the window, its time is
+/// The report of the block that is driven from `from_s` to `to_s` of `window`. Where it goes on beyond the window, its time is
 /// estimated from the mean speed.
-pub fn of_leg<const L: usize>(
+pub fn of_block<const L: usize>(
     window: &Window<L>,
     counted: &Lanes<L>,
-    leg: &Leg,
+    queued: &QueuedBlock,
     (from_s, to_s): (f64, f64),
 ) -> BlockReport {
     let first = window.piece_at(from_s);
@@ -54,22 +54,22 @@ pub fn of_leg<const L: usize>(
     } else {
         speed(last, to_s)
     };
-    let driven = window.along(to_s) - leg.start.max(window.along(from_s));
-    let whole = leg.end - leg.start;
-    let time_s = if driven > 0.0 && leg.end > window.end() + 1e-9 {
+    let driven = window.along(to_s) - queued.start.max(window.along(from_s));
+    let whole = queued.end - queued.start;
+    let time_s = if driven > 0.0 && queued.end > window.end() + 1e-9 {
         (to_s - from_s) * (whole / driven).max(1.0)
     } else {
         to_s - from_s
     };
     report(
-        leg.block.index,
-        limited_by(&bound_s, leg),
+        queued.block.index,
+        limited_by(&bound_s, queued),
         [start, peak, end],
         time_s,
     )
 }
 
-fn limited_by(bound_s: &[f64; 5], leg: &Leg) -> LimitedBy {
+fn limited_by(bound_s: &[f64; 5], queued: &QueuedBlock) -> LimitedBy {
     let most = (0..5).fold(
         0,
         |best, n| if bound_s[n] > bound_s[best] { n } else { best },
@@ -78,7 +78,7 @@ fn limited_by(bound_s: &[f64; 5], leg: &Leg) -> LimitedBy {
         n if n == Bound::Jerk as usize => LimitedBy::Jerk,
         n if n == Bound::Acceleration as usize => LimitedBy::Acceleration,
         n if n == Bound::Velocity as usize => LimitedBy::Velocity,
-        n if n == Bound::Feed as usize => limited_by_feed(&leg.block),
+        n if n == Bound::Feed as usize => limited_by_feed(&queued.block),
         _ => LimitedBy::Tolerance,
     }
 }

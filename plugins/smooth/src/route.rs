@@ -57,9 +57,9 @@ impl<const L: usize> Chord<L> {
     }
 }
 
-/// A block with a path.
+/// A block with a path that is not driven to its end yet.
 #[derive(Clone, Debug)]
-pub struct Leg {
+pub struct QueuedBlock {
     pub block: Block,
     /// Path coordinates of its ends.
     pub start: f64,
@@ -81,7 +81,7 @@ pub enum Item {
     /// Rest.
     Dwell(Block),
     /// Motion.
-    Leg(Leg),
+    Motion(QueuedBlock),
 }
 
 /// The path that is known and not driven yet.
@@ -158,25 +158,26 @@ impl<const L: usize> Route<L> {
         self.chords.len()
     }
 
-    /// The leg in front.
-    pub fn front(&self) -> Option<&Leg> {
+    /// The block in front.
+    pub fn front(&self) -> Option<&QueuedBlock> {
         match self.items.front() {
-            Some(Item::Leg(leg)) => Some(leg),
+            Some(Item::Motion(queued)) => Some(queued),
             _ => None,
         }
     }
 
-    /// The end of the leg in front, where the leg behind it has another feed, and a direction in which a motion passes it: across the
+    /// The end of the block in front, where the block behind it has another feed, and a direction in which a motion passes it: across the
     /// plane that halves the angle between both.
     pub fn end_before_other_feed(&self) -> Option<(Lanes<L>, Lanes<L>)> {
-        let leg = self.front()?;
-        let Some(Item::Leg(next)) = self.items.get(1) else {
+        let queued = self.front()?;
+        let Some(Item::Motion(next)) = self.items.get(1) else {
             return None;
         };
-        if next.block.command_feed_mm_per_s() == leg.block.command_feed_mm_per_s() {
+        if next.block.command_feed_mm_per_s() == queued.block.command_feed_mm_per_s() {
             return None;
         }
-        let behind = (leg.first_chord + u64::from(leg.chords)).checked_sub(self.first)? as usize;
+        let behind =
+            (queued.first_chord + u64::from(queued.chords)).checked_sub(self.first)? as usize;
         let last = self.chords.get(behind.checked_sub(1)?)?;
         let next = self.chords.get(behind)?;
         Some((next.start, plus(&last.direction, 1.0, &next.direction)))
@@ -189,7 +190,7 @@ impl<const L: usize> Route<L> {
     }
 
     fn rest_behind_last(&mut self) {
-        if let Some(Item::Leg(last)) = self.items.back_mut() {
+        if let Some(Item::Motion(last)) = self.items.back_mut() {
             last.rests = true;
         }
     }
@@ -207,7 +208,7 @@ impl<const L: usize> Route<L> {
         let rotary = frame.counts_rotary(block);
         let counted = frame.counted(rotary);
         let joins = match self.items.back() {
-            Some(Item::Leg(last)) => {
+            Some(Item::Motion(last)) => {
                 !last.rests && last.rotary == rotary && !block.starts_at_rest()
             }
             _ => false,
@@ -295,7 +296,7 @@ impl<const L: usize> Route<L> {
         let fastest = before.map_or(f64::INFINITY, |direction| along(limits, &direction));
         let min_s = (block.length_mm / (block.command_feed_mm_per_s() * feed_ratio))
             .max((self.end - start) / fastest);
-        self.items.push_back(Item::Leg(Leg {
+        self.items.push_back(Item::Motion(QueuedBlock {
             block: *block,
             start,
             end: self.end,
@@ -328,9 +329,9 @@ impl<const L: usize> Route<L> {
 
     /// The path around `s` from the last rest to the next.
     pub fn run(&self, s: f64, finished: bool) -> Run<'_, L> {
-        let legs = self.items.iter().map_while(|item| {
-            if let Item::Leg(leg) = item {
-                Some(leg)
+        let blocks = self.items.iter().map_while(|item| {
+            if let Item::Motion(queued) = item {
+                Some(queued)
             } else {
                 None
             }
@@ -339,11 +340,11 @@ impl<const L: usize> Route<L> {
         let mut closed = false;
         let mut rotary = false;
         let mut rapid = false;
-        for (n, leg) in legs.enumerate() {
-            end = leg.first_chord + u64::from(leg.chords);
-            rotary = leg.rotary;
-            rapid = leg.block.kind == BlockKind::Rapid || rapid && n > 0;
-            if leg.rests {
+        for (n, queued) in blocks.enumerate() {
+            end = queued.first_chord + u64::from(queued.chords);
+            rotary = queued.rotary;
+            rapid = queued.block.kind == BlockKind::Rapid || rapid && n > 0;
+            if queued.rests {
                 closed = true;
                 break;
             }
@@ -359,7 +360,7 @@ impl<const L: usize> Route<L> {
         }
     }
 
-    /// Takes the leg in front off.
+    /// Takes the block in front off.
     pub fn pop(&mut self) -> Option<Item> {
         self.items.pop_front()
     }

@@ -66,14 +66,14 @@ pub struct Reach {
 }
 
 /// Directions at `s` and a way behind and before it, looked up in chords.
-struct Looker<'a, const L: usize> {
+struct DirectionLookup<'a, const L: usize> {
     chords: &'a [Chord<L>],
     at: usize,
     /// The chords a corner's way behind and before the place looked at last: a node lies near the one before it.
     ends: [usize; 2],
 }
 
-impl<const L: usize> Looker<'_, L> {
+impl<const L: usize> DirectionLookup<'_, L> {
     /// The direction at `s`. Where it was last looked for is `near`, and where it is found afterwards.
     #[inline(always)]
     fn direction_at(&self, s: f64, near: &mut usize) -> &Lanes<L> {
@@ -97,19 +97,19 @@ impl<const L: usize> Looker<'_, L> {
 /// keeps acceleration and jerk.
 #[inline(always)]
 fn cap<const L: usize>(
-    looker: &mut Looker<'_, L>,
+    directions: &mut DirectionLookup<'_, L>,
     frame: &Frame<L>,
     s: f64,
     most: f64,
     corner_s: f64,
 ) -> f64 {
-    let here = looker.here(s);
+    let here = directions.here(s);
     let mut v = most;
-    let [mut behind, mut before] = looker.ends;
+    let [mut behind, mut before] = directions.ends;
     for _ in 0..80 {
         let way = v * corner_s;
-        let from = looker.direction_at(s - way, &mut behind);
-        let to = looker.direction_at(s + way, &mut before);
+        let from = directions.direction_at(s - way, &mut behind);
+        let to = directions.direction_at(s + way, &mut before);
         let mut fits = true;
         for l in 0..L {
             let bend = (from[l] - 2.0 * here[l] + to[l]).abs();
@@ -123,7 +123,7 @@ fn cap<const L: usize>(
         }
         v *= SLOWER;
     }
-    looker.ends = [behind, before];
+    directions.ends = [behind, before];
     v
 }
 
@@ -187,7 +187,7 @@ impl Timing {
     ) {
         self.nodes.clear();
         let at = run.chord_at(reach.s, 0);
-        let mut looker = Looker {
+        let mut directions = DirectionLookup {
             chords: run.chords,
             at,
             ends: [at; 2],
@@ -199,15 +199,15 @@ impl Timing {
         // How long a corner takes, and what that follows from.
         let mut last_corner = (f64::NAN, 0.0);
         // Where the next sharp turn before and the last one behind are.
-        let mut ahead = looker.at;
+        let mut ahead = directions.at;
         let mut grown = 0.25;
         loop {
-            looker.at = run.chord_at(s, looker.at);
-            let chord = &run.chords[looker.at];
+            directions.at = run.chord_at(s, directions.at);
+            let chord = &run.chords[directions.at];
             let speed = feed(chord, counted).min(along(&limits, &chord.direction));
             let jerk = along(&frame.jerk, &chord.direction);
             let tolerance = chord.tolerance;
-            let next = run.chords.get(looker.at + 1);
+            let next = run.chords.get(directions.at + 1);
             let speed = speed.min(polygon_speed(chord, next, jerk));
             let corner = tolerance / frame.jerk[0].min(jerk);
             if corner != last_corner.0 {
@@ -215,7 +215,7 @@ impl Timing {
             }
             let corner_s = last_corner.1;
             let most = speed.min(last_cap / (SLOWER * SLOWER * SLOWER * SLOWER));
-            let cap = cap(&mut looker, frame, s, most, corner_s);
+            let cap = cap(&mut directions, frame, s, most, corner_s);
             last_cap = cap;
             let acceleration = along(&frame.acceleration, &chord.direction);
             let mut node = Node {
@@ -242,7 +242,7 @@ impl Timing {
                 part_s
             };
             let longest = (apart_s * node.speed).clamp(GRADED.0, LONGEST);
-            s = next_node(run, &looker, reach, s, longest, &mut ahead, &mut grown);
+            s = next_node(run, &directions, reach, s, longest, &mut ahead, &mut grown);
         }
     }
 }
@@ -266,7 +266,7 @@ fn polygon_speed<const L: usize>(chord: &Chord<L>, next: Option<&Chord<L>>, jerk
 #[inline(always)]
 fn next_node<const L: usize>(
     run: &Run<'_, L>,
-    looker: &Looker<'_, L>,
+    directions: &DirectionLookup<'_, L>,
     reach: &Reach,
     s: f64,
     longest: f64,
@@ -274,7 +274,7 @@ fn next_node<const L: usize>(
     grown: &mut f64,
 ) -> f64 {
     let chords = run.chords;
-    let i = looker.at;
+    let i = directions.at;
     *ahead = (*ahead).max(i + 1);
     // Nodes gather around sharp turns and the ends: behind one the distance grows, before one it shrinks.
     let behind = if i == 0 || chords[i].turn > SHARP {

@@ -8,26 +8,21 @@
 use tandem_motion::in_wide_instructions;
 use tandem_motion::tube::Lanes;
 
-use crate::beside::{
-    ALLOWED, Beside, DEVIATION, HALVINGS, NEAR_ENOUGH, SEARCHED, beside, closer, stretch, to_chord,
-};
 use crate::feeds::Feeder;
-use crate::frame::{Frame, dot};
+use crate::frame::{Frame, dot, larger, to_chord};
 use crate::order::{Order, REACH};
-use crate::peaks::{Reached, bound, derivatives, highest, positions, turning};
-use crate::plan::Start;
+use crate::path_distance::{
+    ALLOWED, DEVIATION, FAR, HALVINGS, NEAR_ENOUGH, PathDistance, SEARCHED, closer, distance_bound,
+    path_distance,
+};
+use crate::peaks::{
+    ACCELERATION, JERK, Reached, SPEED, bound, derivatives, highest, positions, turning,
+};
 use crate::route::Run;
 use crate::travel::Travel;
 use crate::turns::Turns;
 use crate::waypoints::Timer;
-use crate::window::{Stop, Window};
-
-/// Share of a limit that the motion may reach at an instant.
-pub const SPEED: f64 = 1.0;
-pub const ACCELERATION: f64 = 0.9995;
-pub const JERK: f64 = 1.003;
-/// Share of the tolerance beyond which it does not matter how much it is: the boxes of the next try are as narrow as they get.
-pub const FAR: f64 = 1.4;
+use crate::window::{Start, Stop, Window};
 
 /// The largest of each, as a share of what is allowed.
 #[derive(Clone, Copy, Debug, Default)]
@@ -253,7 +248,7 @@ impl<const L: usize> Checker<L> {
         let mut mark = 0;
         let mut piece = 0;
         let mut near = run.chord_at(window.marks[0].s, 0);
-        let mut last: Option<Beside<L>> = None;
+        let mut last: Option<PathDistance<L>> = None;
         let mut left_before = ALLOWED;
         self.nearness.clear();
         for (n, sample) in self.samples[before..].iter().enumerate() {
@@ -265,7 +260,7 @@ impl<const L: usize> Checker<L> {
             let b = window.marks[mark + 1];
             let s = a.s + (b.s - a.s) * ((t - a.t) / (b.t - a.t).max(1e-12)).clamp(0.0, 1.0);
             near = run.chord_at(s, near);
-            let here = beside(run, near, sample);
+            let here = path_distance(run, near, sample);
             let Some(last) = last.replace(here) else {
                 if is_close {
                     self.nearness.push(ALLOWED * here.share);
@@ -285,7 +280,7 @@ impl<const L: usize> Checker<L> {
                 self.nearness.push(ALLOWED * here.share);
                 left_before = left;
             }
-            let mut between = stretch(run, &last, &here, bulge);
+            let mut between = distance_bound(run, &last, &here, bulge);
             if between > 1.0 {
                 let ends = [t - period_s, t.min(window.duration_s())];
                 between = closer(run, window, ends, (&last, &here), bulge, HALVINGS);
@@ -438,12 +433,6 @@ const TURNS: f64 = 0.1;
 
 /// Way before the start, mm, in which vertices are looked at again: the samples behind the start are new.
 const AROUND: f64 = 0.05;
-
-#[inline(always)]
-pub fn larger(a: f64, b: f64) -> f64 {
-    // Where either is no number, neither is the result.
-    if b > a || b.is_nan() { b } else { a }
-}
 
 #[inline(always)]
 fn smaller(a: f64, b: f64) -> f64 {

@@ -3,12 +3,10 @@
 use tandem_motion::in_wide_instructions;
 use tandem_motion::tube::{Lanes, Waypoint, each};
 
-use crate::frame::{dot, largest, minus};
-use crate::plan::INTERVALS;
+use crate::frame::{dot, larger, largest, minus};
 use crate::route::{Chord, Run};
 use crate::timing::Mark;
 use crate::travel::Travel;
-use crate::verify::larger;
 
 /// Share of the tolerance that boxes use.
 pub const BOX_SHARE: f64 = 0.955;
@@ -40,6 +38,8 @@ const DENSEST: f64 = 16.0;
 /// Other waypoints in a step at most. At 2 and 4 curves at 1 µm are driven up to 1.3 times as long as they need be, where 3.5 and 3
 /// keep within 1.2 (`smooth_at_a_micrometre_is_near_the_exact_curve`).
 const DENSE: f64 = 3.5;
+/// Intervals of a window at least and at most.
+pub const INTERVALS: (usize, usize) = (7, 420);
 /// Most waypoints of a window: two lie a sixteenth of a step apart, or between them lie those that fill a gap.
 pub const MAX_WAYPOINTS: usize = (DENSEST as usize + 2) * INTERVALS.1;
 /// Share of its box that a lane gets which rests: a slow motion has next to no jerk, and would go to the middle of what its travel

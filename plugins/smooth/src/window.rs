@@ -5,9 +5,9 @@ use std::cell::Cell;
 use tandem_motion::hermite;
 use tandem_motion::tube::{Lanes, each};
 
-use crate::plan::INTERVALS;
+use crate::route::Run;
 use crate::timing::Mark;
-use crate::waypoints::{MAX_WAYPOINTS, Timer};
+use crate::waypoints::{INTERVALS, MAX_WAYPOINTS, Timer};
 
 /// Most marks of a window: its waypoints, and its two ends.
 const MAX_MARKS: usize = MAX_WAYPOINTS + 2;
@@ -113,6 +113,37 @@ pub struct Window<const L: usize> {
 
 /// Marks that are looked at beside the last ones before all are searched.
 const NEAR: usize = 8;
+
+/// From where a window is planned, and how far.
+#[derive(Clone, Copy, Debug)]
+pub struct Start<'a, const L: usize> {
+    pub state: State<L>,
+    pub s: f64,
+    pub resting: bool,
+    /// Positions before, a fine period apart.
+    pub before: &'a [Lanes<L>],
+    /// Path coordinate that it may go to at most.
+    pub end: f64,
+    pub window_s: f64,
+    /// The window that it goes on from, and when.
+    pub old: Option<(&'a Window<L>, f64)>,
+}
+
+impl<const L: usize> Start<'_, L> {
+    /// The least tolerance of the path that the window may drive.
+    pub fn least_tolerance(&self, run: &Run<'_, L>) -> f64 {
+        let mut way_s = 0.0;
+        let mut tolerance = f64::INFINITY;
+        for chord in &run.chords[run.chord_at(self.s, 0)..] {
+            if chord.s > self.end || way_s > self.window_s {
+                break;
+            }
+            tolerance = chord.tolerance.min(tolerance);
+            way_s += chord.length / chord.speed.max(1e-9);
+        }
+        tolerance
+    }
+}
 
 /// What a window leaves for a stop, as path speed counts.
 #[derive(Clone, Copy, Debug)]

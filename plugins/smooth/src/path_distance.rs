@@ -2,10 +2,12 @@
 
 use tandem_motion::tube::{Lanes, each};
 
-use crate::frame::{dot, minus, plus};
+use crate::frame::{dot, larger, minus, plus};
 use crate::route::Run;
-use crate::verify::{FAR, larger};
 use crate::window::Window;
+
+/// Share of the tolerance beyond which it does not matter how much it is: the boxes of the next try are as narrow as they get.
+pub const FAR: f64 = 1.4;
 
 /// Share of the tolerance that the motion may reach at an instant.
 pub const ALLOWED: f64 = 0.999;
@@ -18,9 +20,9 @@ pub const NEAR_ENOUGH: f64 = 0.35;
 /// Chords searched on each side.
 pub const SEARCHED: usize = 400;
 
-/// A place of the motion, and the path beside it.
+/// A place of the motion, and the nearest one of the path.
 #[derive(Clone, Copy, Debug)]
-pub struct Beside<const L: usize> {
+pub struct PathDistance<const L: usize> {
     point: Lanes<L>,
     chord: usize,
     /// The place on that chord.
@@ -30,7 +32,7 @@ pub struct Beside<const L: usize> {
     pub share: f64,
 }
 
-impl<const L: usize> Beside<L> {
+impl<const L: usize> PathDistance<L> {
     /// The chord of the place on the path.
     pub fn chord(&self) -> usize {
         self.chord
@@ -43,9 +45,13 @@ impl<const L: usize> Beside<L> {
     }
 }
 
-/// The path beside `point`, around chord `near`.
+/// The place of the path that is nearest to `point`, around chord `near`.
 #[inline(always)]
-pub fn beside<const L: usize>(run: &Run<'_, L>, near: usize, point: &Lanes<L>) -> Beside<L> {
+pub fn path_distance<const L: usize>(
+    run: &Run<'_, L>,
+    near: usize,
+    point: &Lanes<L>,
+) -> PathDistance<L> {
     let chords = run.chords;
     let look = |i: usize| {
         let chord = &chords[i];
@@ -78,7 +84,7 @@ pub fn beside<const L: usize>(run: &Run<'_, L>, near: usize, point: &Lanes<L>) -
     let along = dot(&minus(point, &chord.start), &chord.direction).clamp(0.0, chord.length);
     let share = best.sqrt();
     let foot = plus(&chord.start, along, &chord.direction);
-    Beside {
+    PathDistance {
         point: *point,
         chord: found,
         foot,
@@ -91,7 +97,12 @@ pub fn beside<const L: usize>(run: &Run<'_, L>, near: usize, point: &Lanes<L>) -
 /// them stands off the line between their feet by no more than they do themselves; the path between the feet stands off
 /// that line by no more than its vertices, and the motion off the other by no more than `bulge`.
 #[inline(always)]
-pub fn stretch<const L: usize>(run: &Run<'_, L>, a: &Beside<L>, b: &Beside<L>, bulge: f64) -> f64 {
+pub fn distance_bound<const L: usize>(
+    run: &Run<'_, L>,
+    a: &PathDistance<L>,
+    b: &PathDistance<L>,
+    bulge: f64,
+) -> f64 {
     let chords = run.chords;
     let first = a.chord.min(b.chord);
     let last = a.chord.max(b.chord);
@@ -117,7 +128,7 @@ pub fn closer<const L: usize>(
     run: &Run<'_, L>,
     window: &Window<L>,
     [from_s, to_s]: [f64; 2],
-    (a, b): (&Beside<L>, &Beside<L>),
+    (a, b): (&PathDistance<L>, &PathDistance<L>),
     bulge: f64,
     left: u32,
 ) -> f64 {
@@ -130,7 +141,7 @@ pub fn closer<const L: usize>(
         return ends + (dot(&way, &way).sqrt() / 2.0 + bulge) / (ALLOWED * least);
     }
     let t = f64::midpoint(from_s, to_s);
-    let middle = beside(run, usize::midpoint(a.chord, b.chord), &window.state(t)[0]);
+    let middle = path_distance(run, usize::midpoint(a.chord, b.chord), &window.state(t)[0]);
     let mut worst = larger(ends, middle.share);
     if turns_back(run, a, &middle) || turns_back(run, &middle, b) {
         // Between two samples of this phase, but a slower motion has one there.
@@ -141,7 +152,7 @@ pub fn closer<const L: usize>(
         if worst > 1.0 || worst.is_nan() {
             break;
         }
-        let between = stretch(run, places.0, places.1, bulge / 4.0);
+        let between = distance_bound(run, places.0, places.1, bulge / 4.0);
         let between = if between > 1.0 {
             closer(run, window, times, places, bulge / 4.0, left - 1)
         } else {
@@ -155,7 +166,7 @@ pub fn closer<const L: usize>(
 /// Whether the motion goes back from `a` to `b`, by more than two places within tolerance of them may: on a chord behind which,
 /// and before which, the path goes on in much the same direction. Elsewhere the nearest place may be one that is passed at another
 /// time.
-fn turns_back<const L: usize>(run: &Run<'_, L>, a: &Beside<L>, b: &Beside<L>) -> bool {
+fn turns_back<const L: usize>(run: &Run<'_, L>, a: &PathDistance<L>, b: &PathDistance<L>) -> bool {
     let chord = &run.chords[b.chord];
     let back = -dot(&minus(&b.point, &a.point), &chord.direction);
     if a.chord != b.chord || back <= 2.0 * ALLOWED * chord.tolerance {
@@ -169,24 +180,10 @@ fn turns_back<const L: usize>(run: &Run<'_, L>, a: &Beside<L>, b: &Beside<L>) ->
         .all(|next| dot(&next.direction, &chord.direction) > 0.0)
 }
 
-/// The squared distance of `point` from the line between `a` and `b`.
-#[inline(always)]
-pub fn to_chord<const L: usize>(point: &Lanes<L>, a: &Lanes<L>, b: &Lanes<L>) -> f64 {
-    let chord = minus(b, a);
-    let way = minus(point, a);
-    let squared = dot(&chord, &chord);
-    let along = if squared > 0.0 {
-        (dot(&way, &chord) / squared).clamp(0.0, 1.0)
-    } else {
-        0.0
-    };
-    let across: Lanes<L> = each(|l| way[l] - along * chord[l]);
-    dot(&across, &across)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::frame::to_chord;
     use crate::order::tests::open;
     use crate::route::Chord;
     use crate::window::Piece;
@@ -226,11 +223,11 @@ mod tests {
         let bulge = most.sqrt() * end_s * end_s / 8.0;
         let last = run.chords.len() - 1;
         let places = (
-            beside(run, 0, &window.state(0.0)[0]),
-            beside(run, last, &window.state(end_s)[0]),
+            path_distance(run, 0, &window.state(0.0)[0]),
+            path_distance(run, last, &window.state(end_s)[0]),
         );
         let (from, to) = (&places.0, &places.1);
-        let between = stretch(run, from, to, bulge);
+        let between = distance_bound(run, from, to, bulge);
         if between > 1.0 {
             closer(run, window, [0.0, end_s], (from, to), bulge, HALVINGS)
         } else {
@@ -302,7 +299,7 @@ mod tests {
                     ..path(&mut Random::new(1), 0.0, 1.0)[0]
                 })
                 .collect();
-            beside(&open(&chords), 10, &[0.5, 0.0]).off
+            path_distance(&open(&chords), 10, &[0.5, 0.0]).off
         };
         for (distances, nearest) in [
             ([0.3, 0.1, 0.1], 0.3),
@@ -325,14 +322,14 @@ mod tests {
         let corner = chords[1].start;
         chords[1].direction = [-chords[0].direction[1], chords[0].direction[0]];
         let run = open(&chords);
-        let before = beside(&run, 0, &chords[0].at(chords[0].end() - 0.3));
-        let behind = beside(&run, 1, &plus(&corner, 0.8, &chords[1].direction));
+        let before = path_distance(&run, 0, &chords[0].at(chords[0].end() - 0.3));
+        let behind = path_distance(&run, 1, &plus(&corner, 0.8, &chords[1].direction));
         for (a, b) in [(&before, &behind), (&behind, &before)] {
-            let share = stretch(&run, a, b, 0.1);
+            let share = distance_bound(&run, a, b, 0.1);
             let expected = (0.3 * 0.8 / 0.3_f64.hypot(0.8) + 0.1) / (ALLOWED * 2.0);
             assert!((share - expected).abs() < 1e-9, "{share}, not {expected}");
         }
-        let same = stretch(&run, &before, &before, 0.1);
+        let same = distance_bound(&run, &before, &before, 0.1);
         assert!((same - 0.1 / (ALLOWED * 2.0)).abs() < 1e-9, "{same}");
     }
 
@@ -346,7 +343,7 @@ mod tests {
                 let at = chords[1].at(chords[1].s + 0.9);
                 let place = |back: f64| {
                     let point = plus(&at, -back, &chords[1].direction);
-                    beside(&run, 1, &point)
+                    path_distance(&run, 1, &point)
                 };
                 let goes_back = turns_back(&run, &place(0.0), &place(back * tolerance));
                 assert_eq!(!goes_back, passes, "{back} times {tolerance} mm");
@@ -372,7 +369,7 @@ mod tests {
                 piece.c[n] = each(|l| x * direction[l]);
             }
             let window = window(piece);
-            let places = [0.0, 1.0].map(|t| beside(&run, 0, &window.state(t)[0]));
+            let places = [0.0, 1.0].map(|t| path_distance(&run, 0, &window.state(t)[0]));
             let ends = (&places[0], &places[1]);
             let off = closer(&run, &window, [0.0, 1.0], ends, 0.0, HALVINGS);
             assert_eq!(off < FAR, passes, "{x:?}: {off}");
@@ -384,7 +381,7 @@ mod tests {
     fn in_the_end_half_of_the_way_between_two_places_counts() {
         let chords = path(&mut Random::new(1), 0.0, 0.5);
         let run = open(&chords);
-        let place = |s: f64| beside(&run, 0, &chords[0].at(s));
+        let place = |s: f64| path_distance(&run, 0, &chords[0].at(s));
         let (from, to) = (place(0.2), place(0.6));
         let off = closer(&run, &Window::new(), [0.0, 1.0], (&from, &to), 0.1, 0);
         let expected = from.share.max(to.share) + (0.4 / 2.0 + 0.1) / (ALLOWED * 0.5);
@@ -400,7 +397,7 @@ mod tests {
                 chords[turned].direction = chords[1].direction.map(|d| -d);
             }
             let run = open(&chords);
-            let at = |s: f64| beside(&run, 1, &chords[1].at(chords[1].s + s));
+            let at = |s: f64| path_distance(&run, 1, &chords[1].at(chords[1].s + s));
             assert_eq!(
                 turns_back(&run, &at(0.7), &at(0.4)),
                 goes_back,
