@@ -3,7 +3,7 @@
 use std::fmt::{self, Write as _};
 use std::sync::Arc;
 
-use crate::line_error::{LineError, Span};
+use crate::line_error::{LineError, Sketch, Span};
 
 /// Most characters of a line that are shown on either side of the column.
 const CONTEXT: usize = 60;
@@ -24,19 +24,6 @@ impl fmt::Display for Severity {
             Self::Warning => "warning",
         })
     }
-}
-
-/// A place in the path where the tool does not fit, in the plane of the path, machine coordinates in mm.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Sketch {
-    /// The axes of the plane, the one to the right first.
-    pub axes: [char; 2],
-    /// The programmed moves around the place: the line of each, and points of its path.
-    pub moves: Vec<(u32, Vec<[f64; 2]>)>,
-    /// Where the tool stands beside the corner.
-    pub tool_at_mm: [f64; 2],
-    /// Its radius.
-    pub tool_radius_mm: f64,
 }
 
 /// One error of a part program, or a warning.

@@ -224,7 +224,8 @@ impl Interpreter {
         state.curves = crate::words::curve::Curves::default();
         state.compensation = crate::words::compensation::Compensation::default();
         state.saved = crate::words::modal::SavedStates::default();
-        (state.ended, state.line) = (false, self.state.line);
+        state.ended = false;
+        state.line = self.state.line;
         self.state = *state;
         self.parameters.write(written);
     }
@@ -251,7 +252,8 @@ impl Interpreter {
 
     /// The modal words in force, as in `G1 G17 G21 G90 G94 G54 G64`, for people. Allocates.
     pub fn modal_words(&self) -> Vec<String> {
-        let (modes, coordinates) = (&self.state.modes, &self.state.coordinates);
+        let modes = &self.state.modes;
+        let coordinates = &self.state.coordinates;
         let either = |on: bool, yes: &str, no: &str| if on { yes } else { no }.to_string();
         let mut words: Vec<String> = self
             .state

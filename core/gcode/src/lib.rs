@@ -64,10 +64,11 @@ pub use config::{
     Config, DEFAULT_MAX_STEPS, FIRST_USER_COMMAND, LAST_USER_COMMAND, Lines, ProbeInput, Tool,
     ToolChange,
 };
-pub use diagnostic::{Diagnostic, Severity, Sketch};
+pub use diagnostic::{Diagnostic, Severity};
 pub use interpreter::{Interpreter, MAX_LINE_BYTES};
 pub use item::{Input, InputMode, InputWait, Item, ProbeResult, UserCommand};
 pub use lasting::{InForce, Lasting, Ledger, Moment, SwitchedOn, WORK_SYSTEMS, system_code};
+pub use line_error::Sketch;
 pub use program::{Program, ProgramError};
 pub use stated::Watched;
 pub use stream::Stream;

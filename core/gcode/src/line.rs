@@ -54,7 +54,7 @@ impl Line<'_> {
                 .get(Group::CutterRadius)
                 .is_none_or(|word| word.tenths != 400)
         {
-            compensation::refuse_company(self)?;
+            compensation::refuse_incompatible(self)?;
         }
         self.act(BEFORE_FEED)?;
         modes::feed(self)?;
@@ -364,7 +364,8 @@ impl Line<'_> {
 
     /// Appends an event before the next block.
     pub fn event(&mut self, kind: EventKind, index: u32, value: f64) {
-        let (line, before_block) = (self.state.line, self.state.path.next_index);
+        let line = self.state.line;
+        let before_block = self.state.path.next_index;
         let event = Item::Event(Event::new(
             kind,
             line,

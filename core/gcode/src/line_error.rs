@@ -1,7 +1,5 @@
 //! What went wrong in a line, before it is known which line of which file that is.
 
-use crate::diagnostic::Sketch;
-
 /// Bytes `start..end` of a line, from 0.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Span {
@@ -40,6 +38,19 @@ pub(crate) struct Details {
 pub(crate) struct SourceLine {
     pub number: u32,
     pub text: Vec<u8>,
+}
+
+/// A place in the path where the tool does not fit, in the plane of the path, machine coordinates in mm.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sketch {
+    /// The axes of the plane, the one to the right first.
+    pub axes: [char; 2],
+    /// The programmed moves around the place: the line of each, and points of its path.
+    pub moves: Vec<(u32, Vec<[f64; 2]>)>,
+    /// Where the tool stands beside the corner.
+    pub tool_at_mm: [f64; 2],
+    /// Its radius.
+    pub tool_radius_mm: f64,
 }
 
 impl LineError {

@@ -183,6 +183,27 @@ pub fn tool_keys() -> &'static [Key] {
     TOOLS
 }
 
+/// Whether a part of a key's path stands for names that the file chooses.
+pub fn is_placeholder(part: &str) -> bool {
+    part.starts_with('<')
+}
+
+/// Last parts of a key's path that stand for whatever a plugin, script or wrapper reads.
+const OPEN: [&str; 3] = ["<option>", "<parameter>", "<fault>"];
+
+/// Whether a key's path ends in something that a plugin or script reads.
+pub fn is_open(pattern: &str) -> bool {
+    OPEN.iter().any(|open| pattern.ends_with(open))
+}
+
+/// Whether a path begins like a key's path, over the shorter of the two.
+pub fn agree(pattern: &str, path: &[&str]) -> bool {
+    pattern
+        .split('.')
+        .zip(path)
+        .all(|(pattern, part)| is_placeholder(pattern) || pattern == *part)
+}
+
 /// The reference of both files as Markdown tables.
 pub fn markdown() -> String {
     format!(

@@ -2,8 +2,7 @@
 
 use strsim::damerau_levenshtein;
 
-use crate::keys::Key;
-use crate::schema::{agree, is_open, is_placeholder};
+use crate::keys::{Key, agree, is_open, is_placeholder};
 use crate::shown::dotted;
 
 /// What a key in another table costs more than one in the same, in edits.

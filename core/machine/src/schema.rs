@@ -1,7 +1,7 @@
 //! Which keys are known, and what an unknown one was probably meant to be.
 
 use crate::error::ValuePlace;
-use crate::keys::Key;
+use crate::keys::{Key, agree, is_open};
 use crate::nearest::nearest;
 use crate::node::{Node, Table, Value};
 use crate::problems::Problems;
@@ -18,27 +18,6 @@ pub enum Known {
     Open,
     /// Nothing.
     No,
-}
-
-/// Whether a part of a key's path stands for names that the file chooses.
-pub fn is_placeholder(part: &str) -> bool {
-    part.starts_with('<')
-}
-
-/// Last parts of a key's path that stand for whatever a plugin, script or wrapper reads.
-const OPEN: [&str; 3] = ["<option>", "<parameter>", "<fault>"];
-
-/// Whether a key's path ends in something that a plugin or script reads.
-pub fn is_open(pattern: &str) -> bool {
-    OPEN.iter().any(|open| pattern.ends_with(open))
-}
-
-/// Whether a path begins like a key's path, over the shorter of the two.
-pub fn agree(pattern: &str, path: &[&str]) -> bool {
-    pattern
-        .split('.')
-        .zip(path)
-        .all(|(pattern, part)| is_placeholder(pattern) || pattern == *part)
 }
 
 /// What `path` is among `keys`.

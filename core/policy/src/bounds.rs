@@ -2,7 +2,8 @@
 
 use tandem_sdk::BlockKind;
 
-use crate::window::Asks;
+/// What a script asks for a block: time constant, path tolerance, feed cap; NaN where it leaves them.
+pub type Asks = [f64; 3];
 
 /// What a script may ask for on this machine.
 #[derive(Clone, Copy, Debug, PartialEq)]

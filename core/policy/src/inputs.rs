@@ -1,10 +1,10 @@
 //! Inputs: what a script wants to see by name, and where on this machine that is.
 
-use strsim::damerau_levenshtein;
 use tandem_sdk::Axes;
 
 use crate::abi::input;
 use crate::error::Refusal;
+use crate::nearest::nearest;
 
 /// Values of the part program that a script may ask for.
 pub const MAX_PROGRAM_VALUES: usize = 8;
@@ -112,13 +112,8 @@ impl Sights {
             ),
             InputKind::Axis => format!("it looks at the axis {name:?}, which this machine has not"),
             InputKind::Signal => {
-                let nearest = self
-                    .signals
-                    .iter()
-                    .min_by_key(|signal| damerau_levenshtein(signal, name));
-                let hint = nearest.map_or("it has none".to_string(), |nearest| {
-                    format!("the nearest is {nearest}")
-                });
+                let signals = self.signals.iter().map(String::as_str);
+                let hint = nearest(name, signals, "it has none");
                 format!("it looks at the signal {name:?}, which this machine has not; {hint}")
             }
         }

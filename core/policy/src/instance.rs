@@ -3,6 +3,7 @@
 use wasmtime::{Memory, Store, Trap, TypedFunc, WasmParams, WasmResults};
 
 use crate::abi;
+use crate::bounds::Asks;
 use crate::budget::Budget;
 use crate::error::{Refusal, Trouble};
 use crate::geometry::Geometry;
@@ -11,7 +12,7 @@ use crate::layout::Layout;
 use crate::limits::Limits;
 use crate::parameters::{Parameter, resolve};
 use crate::script::{Script, layout_export};
-use crate::window::{Asks, Record, Sight};
+use crate::window::{Record, Sight};
 
 /// A live script. After an error of a call it must not be called again.
 pub struct Instance {

@@ -30,6 +30,7 @@ mod instance;
 mod layout;
 #[cfg(feature = "scripts")]
 mod limits;
+mod nearest;
 mod notes;
 mod parameters;
 mod period;

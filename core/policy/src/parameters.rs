@@ -1,8 +1,7 @@
 //! Parameters: what a module declares, and the values that the machine file gives.
 
-use strsim::damerau_levenshtein;
-
 use crate::error::Refusal;
+use crate::nearest::nearest;
 
 /// A parameter as the module declares it.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,12 +42,8 @@ pub fn resolve(declared: &[Parameter], stated: &[(String, f64)]) -> Result<Vec<f
 
 fn complaint(declared: &[Parameter], name: &str, value: f64) -> Option<String> {
     let Some(parameter) = declared.iter().find(|p| p.name == name) else {
-        let nearest = declared
-            .iter()
-            .min_by_key(|p| damerau_levenshtein(&p.name, name));
-        let hint = nearest.map_or("it declares none".to_string(), |p| {
-            format!("the nearest is {}", p.name)
-        });
+        let names = declared.iter().map(|p| p.name.as_str());
+        let hint = nearest(name, names, "it declares none");
         return Some(format!("it has no parameter {name:?}; {hint}"));
     };
     let Parameter {

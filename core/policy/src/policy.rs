@@ -2,7 +2,7 @@
 
 use tandem_sdk::{Block, Curve};
 
-use crate::bounds::{Bounds, InForce, Tuning};
+use crate::bounds::{Asks, Bounds, InForce, Tuning};
 use crate::budget::Budget;
 use crate::counters::Counters;
 use crate::error::{Refusal, Trouble};
@@ -11,7 +11,7 @@ use crate::inputs::{Input, Places, Sights};
 use crate::notes::Notes;
 use crate::parameters::{Parameter, Values};
 use crate::period::{Period, of_version};
-use crate::window::{Asks, BlockWindow, Looks};
+use crate::window::{BlockWindow, Looks};
 use crate::{Instance, Script};
 
 /// Calls that go wrong before a script is not called any more.

@@ -35,9 +35,6 @@ impl Looks {
     }
 }
 
-/// What a script asks for a block: time constant, path tolerance, feed cap; NaN where it leaves them.
-pub type Asks = [f64; 3];
-
 /// The blocks of a window as they cross into the script.
 #[derive(Debug)]
 pub struct BlockWindow {

@@ -2,12 +2,13 @@
 
 use std::convert::Infallible;
 
+use crate::bounds::Asks;
 use crate::budget::Budget;
 use crate::error::{Refusal, Trouble};
 use crate::geometry::Geometry;
 use crate::inputs::{Input, Places};
 use crate::parameters::Parameter;
-use crate::window::{Asks, Record, Sight};
+use crate::window::{Record, Sight};
 
 /// A compiler of policy scripts, which this build does not have.
 #[derive(Clone)]

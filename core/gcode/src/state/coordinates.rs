@@ -222,13 +222,12 @@ impl Coordinates {
 
     /// Says what lasts of them.
     pub fn tell(&self, lasting: &mut Lasting) {
-        (
-            lasting.origins,
-            lasting.rotations_rad,
-            lasting.active_system,
-        ) = (self.origins, self.rotations, self.active);
+        lasting.origins = self.origins;
+        lasting.rotations_rad = self.rotations;
+        lasting.active_system = self.active;
         (lasting.g92, lasting.g92_stored) = (self.g92, self.g92_stored);
-        (lasting.reference, lasting.tool_offset) = (self.reference, self.tool);
+        lasting.reference = self.reference;
+        lasting.tool_offset = self.tool;
     }
 
     /// Takes what has lasted.
@@ -238,7 +237,8 @@ impl Coordinates {
         self.active = lasting.active_system.min(SYSTEMS - 1);
         (self.g92, self.g92_stored) = (lasting.g92, lasting.g92_stored);
         self.g92_applies = self.g92 != AxisVector::ZERO;
-        (self.reference, self.tool) = (lasting.reference, lasting.tool_offset);
+        self.reference = lasting.reference;
+        self.tool = lasting.tool_offset;
         self.sum_up();
     }
 

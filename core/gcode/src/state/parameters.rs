@@ -296,7 +296,8 @@ fn is_assumed(number: usize, state: &State, letters: &Letters) -> bool {
             .and_then(|letter| letters.axis(*letter))
     };
     let of = |mask: u32, nth: usize| axis(nth).is_some_and(|axis| mask >> axis & 1 != 0);
-    let (offsets, position) = (state.coordinates.assumed, state.path.assumed);
+    let offsets = state.coordinates.assumed;
+    let position = state.path.assumed;
     match number {
         5211..=5219 => of(offsets, number - 5211),
         5221..=5390 => of(offsets, (number - 5221) % 20),

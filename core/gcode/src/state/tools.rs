@@ -45,7 +45,8 @@ impl Tools {
 
     /// Replaces all rows, and the tool in the spindle.
     pub fn set_table(&mut self, tools: &[Tool], in_spindle: u32) {
-        (self.table, self.in_spindle) = (Arc::new(tools.to_vec()), in_spindle);
+        self.table = Arc::new(tools.to_vec());
+        self.in_spindle = in_spindle;
     }
 
     /// Whether these are the same tools in the same places.

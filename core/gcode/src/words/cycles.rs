@@ -400,7 +400,8 @@ fn drill(line: &mut Line, holes: &Holes, at: &mut AxisVector) -> Checked<()> {
             at[axis] = named.unwrap_or(at[axis] + step);
         }
         if let (Some(polar), Some([x, y])) = (line.words.polar, line.state.coordinates.plane()) {
-            let (unit_mm, absolute) = (line.state.modes.unit_mm, line.state.modes.absolute);
+            let unit_mm = line.state.modes.unit_mm;
+            let absolute = line.state.modes.absolute;
             let place = polar.place([at[x] / unit_mm, at[y] / unit_mm], absolute);
             [at[x], at[y]] = place.map(|value| value * unit_mm);
         }

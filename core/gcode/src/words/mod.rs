@@ -177,7 +177,8 @@ impl Word {
         action: Action,
         example: &'static str,
     ) -> Self {
-        let (letter, tenths) = (code.as_bytes()[0], tenths(code));
+        let letter = code.as_bytes()[0];
+        let tenths = tenths(code);
         Self {
             code,
             letter,
@@ -213,7 +214,9 @@ impl Word {
 /// The number of `G61.1` in tenths.
 const fn tenths(code: &str) -> u16 {
     let code = code.as_bytes();
-    let (mut tenths, mut at, mut fraction) = (0, 1, false);
+    let mut tenths = 0;
+    let mut at = 1;
+    let mut fraction = false;
     while at < code.len() {
         if code[at] == b'.' {
             fraction = true;

@@ -204,7 +204,8 @@ fn wait(line: &mut Line) -> Checked<()> {
         ));
     }
     line.rest();
-    let (number, before_block) = (line.state.line, line.state.path.next_index);
+    let number = line.state.line;
+    let before_block = line.state.path.next_index;
     line.out.push(Item::Wait(InputWait {
         line: number,
         before_block,

@@ -93,7 +93,7 @@ fn probe(line: &mut Line, probe: Probe) -> Checked<()> {
     line.advance();
     let word = line.orders.motion_code();
     let stop_on = stop_on(line, probe, word)?;
-    refuse_company(line, word)?;
+    refuse_same_line(line, word)?;
     let end = line.state.path.block_end();
     let displacement = end - line.state.path.last_end;
     let length_mm = line.config.axes.path_length(&displacement);
@@ -137,7 +137,7 @@ fn stop_on(line: &Line, probe: Probe, word: &str) -> Checked<StopOn> {
 }
 
 /// What a probe does not go with.
-fn refuse_company(line: &Line, word: &str) -> Checked<()> {
+fn refuse_same_line(line: &Line, word: &str) -> Checked<()> {
     line.refuse_machine_coordinates()?;
     if line
         .orders

@@ -35,7 +35,8 @@ fn command(line: &mut Line) -> Checked<()> {
     line.rest();
     let [p, q] = [b'P', b'Q'].map(|letter| line.words.get(letter));
     line.event(EventKind::UserCommand, code, p.unwrap_or(-1.0));
-    let (number, before_block) = (line.state.line, line.state.path.next_index);
+    let number = line.state.line;
+    let before_block = line.state.path.next_index;
     line.out.push(Item::Command(UserCommand {
         line: number,
         before_block,

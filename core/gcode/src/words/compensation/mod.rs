@@ -3,8 +3,8 @@
 //! A move is kept back until the next one in the plane says what the corner between them is: only then is it known where
 //! it ends. What stands between the two in the program is kept back with it.
 
-mod company;
 mod corner;
+mod incompatible;
 mod sketch;
 
 use std::fmt::Write as _;
@@ -19,8 +19,8 @@ use crate::item::Item;
 use crate::line::Line;
 use crate::line_error::{Checked, LineError};
 use crate::state::path::NO_MOVE;
-pub(crate) use company::refuse_company;
 use corner::{Corner, Track, along, beside, distance, dot, unit};
+pub(crate) use incompatible::refuse_incompatible;
 use sketch::{Programmed, drawn, gouge};
 
 pub(super) const WORDS: &[Word] = &[
@@ -470,11 +470,9 @@ fn begin(line: &mut Line, held: Held, direction: Point, programmed: Point) {
     let compensation = &mut line.state.compensation;
     compensation.held.push(held);
     compensation.programmed_moves = [compensation.programmed_moves[1], None];
-    (
-        compensation.fresh,
-        compensation.direction,
-        compensation.programmed,
-    ) = (false, direction, programmed);
+    compensation.fresh = false;
+    compensation.direction = direction;
+    compensation.programmed = programmed;
 }
 
 fn keep(line: &mut Line, held: Held) -> Checked<()> {

@@ -3,9 +3,8 @@
 use std::f64::consts::TAU;
 
 use super::corner::{along, beside};
-use crate::diagnostic::Sketch;
 use crate::line::Line;
-use crate::line_error::{LineError, show};
+use crate::line_error::{LineError, Sketch, show};
 use crate::words::circle::Point;
 
 /// Points that an arc is drawn by.
@@ -46,7 +45,8 @@ impl Programmed {
 /// The tool would cut into what the lines leave.
 #[cold]
 pub(super) fn gouge(line: &Line, of: u32, why: &str) -> LineError {
-    let (word, now) = (line.state.compensation.word(), line.state.line);
+    let word = line.state.compensation.word();
+    let now = line.state.line;
     let radius = show(line.state.compensation.radius_mm);
     let message = format!(
         "with {word} and a tool of radius {radius} mm the moves of the lines {of} and {now} cannot be driven: {why}; a smaller \

@@ -174,7 +174,8 @@ fn knot(line: &Line, curve: &mut Curve) -> Checked<()> {
     let Some(knot) = line.words.get(b'K') else {
         return Err(first_fault(line, "K, the knot of this line, is missing"));
     };
-    let (order, index) = (curve.order.unwrap_or(FANUC_ORDER), curve.knots.len());
+    let order = curve.order.unwrap_or(FANUC_ORDER);
+    let index = curve.knots.len();
     let error = |message: String| Err(line.words.error(b'K', "nurbs", message));
     if let Some(before) = curve.knots.last().filter(|before| knot < **before) {
         return error(format!(
@@ -188,7 +189,8 @@ fn knot(line: &Line, curve: &mut Curve) -> Checked<()> {
             "the first {order} knots are equal: the curve begins at its first control point"
         ));
     }
-    let (points, degree) = (curve.points.len(), order - 1);
+    let points = curve.points.len();
+    let degree = order - 1;
     if index > points && curve.knots.last() != Some(&knot) {
         return error(format!(
             "the last {order} knots are equal: the curve ends at its last control point"

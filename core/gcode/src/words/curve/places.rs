@@ -47,7 +47,9 @@ impl Places {
 
 /// Where the words of a line stand that could be read: not what is in comments and brackets, nor names of functions.
 fn words(text: &[u8]) -> Vec<Span> {
-    let (mut words, mut depth, mut in_name) = (Vec::new(), 0_i32, false);
+    let mut words = Vec::new();
+    let mut depth = 0_i32;
+    let mut in_name = false;
     for (at, byte) in text
         .iter()
         .enumerate()

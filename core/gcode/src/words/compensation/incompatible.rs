@@ -1,4 +1,4 @@
-//! What stands beside radius compensation in a line.
+//! Words that radius compensation does not go with.
 
 use crate::line::Line;
 use crate::line_error::Checked;
@@ -8,7 +8,7 @@ use crate::words::{Group, Shape};
 
 /// What does not go with compensation that is on.
 #[cold]
-pub(crate) fn refuse_company(line: &Line) -> Checked<()> {
+pub(crate) fn refuse_incompatible(line: &Line) -> Checked<()> {
     let word = line.state.compensation.word();
     let refuse = |group, other: &str, why: &str| {
         Err(line.orders.error(
