@@ -103,7 +103,8 @@ impl Progress {
     /// Fine periods since program time last passed.
     fn ticks_without(&mut self, program_time_s: f64, tick: u64) -> u64 {
         if program_time_s != self.program_time_s {
-            (self.program_time_s, self.tick) = (program_time_s, tick);
+            self.program_time_s = program_time_s;
+            self.tick = tick;
         }
         tick - self.tick
     }

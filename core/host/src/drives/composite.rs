@@ -106,7 +106,8 @@ impl Part {
 
     /// Takes what is the same in most periods.
     fn take_orders(&mut self, whole: &Setpoint) {
-        let (share, own) = (&self.share, &mut self.setpoint);
+        let share = &self.share;
+        let own = &mut self.setpoint;
         own.enable = whole.enable;
         own.outputs = share.outputs.to_own(whole.outputs);
         if share.spindle {
@@ -122,7 +123,8 @@ impl Part {
     /// Adds its answer to that of the machine; `latches` have been filled before it.
     #[inline]
     fn give(&self, whole: &mut Feedback, latches: &mut usize) {
-        let (share, own) = (&self.share, &self.feedback);
+        let share = &self.share;
+        let own = &self.feedback;
         for (i, joint) in self.joints.iter() {
             whole.state[joint] = own.state[i];
             whole.fault_code[joint] = own.fault_code[i];
@@ -140,7 +142,8 @@ impl Part {
             whole.spindle_at_speed = own.spindle_at_speed;
         }
         if own.has_phase != 0 {
-            (whole.has_phase, whole.phase_ns) = (1, own.phase_ns);
+            whole.has_phase = 1;
+            whole.phase_ns = own.phase_ns;
         }
         let caught = own
             .latches
@@ -152,7 +155,8 @@ impl Part {
     }
 
     fn give_measured(&self, whole: &mut Feedback) {
-        let (share, own) = (&self.share, &self.feedback);
+        let share = &self.share;
+        let own = &self.feedback;
         whole.inputs |= share.inputs.to_machine(own.inputs);
         for run in share.inputs.runs() {
             let (to, from, count) = (run.machine as usize, run.own as usize, run.count as usize);
@@ -368,7 +372,8 @@ impl Driver for Composite {
         };
         for index in 0..self.parts.len() {
             let part = &mut self.parts[index];
-            (part.has_failed, part.sends) = (false, true);
+            part.has_failed = false;
+            part.sends = true;
             match named(part.driver.start(), &part.title) {
                 Ok(own) => part.share.add_to(&mut attached, &own),
                 Err(error) => {

@@ -62,7 +62,8 @@ impl Drives {
             );
             return Err(refusal(machine, &second.section, cause));
         }
-        let (mut drives, mut roster) = (vec![], roster);
+        let mut drives = vec![];
+        let mut roster = roster;
         for made in all {
             drives.push(made.behind_slots(machine, &mut roster)?);
         }

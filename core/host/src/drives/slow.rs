@@ -234,7 +234,8 @@ impl Driver for Slow {
         self.period = 0;
         self.spindle_since = 0;
         self.answered = 0;
-        (self.last, self.feedback) = (Setpoint::default(), Feedback::default());
+        self.last = Setpoint::default();
+        self.feedback = Feedback::default();
         self.driver()
             .map_or_else(|| Err(does_not_answer()), |mut driver| driver.start())
     }

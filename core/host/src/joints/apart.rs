@@ -112,7 +112,8 @@ impl Apart {
         apart.joints = space.joints.iter().enumerate().map(joint).collect();
         apart.homing = machine.homing.iter().filter_map(home).collect();
         // They speak of axes as programs do.
-        (apart.feed_strategy, apart.policy) = (None, None);
+        apart.feed_strategy = None;
+        apart.policy = None;
         Ok(Some(Self {
             machine: apart,
             axis_of,

@@ -26,7 +26,9 @@ pub fn fold(
     offsets: &[f64],
 ) -> Result<Folded, HostError> {
     let axes = machine.axes.count();
-    let (mut limits, mut rows, mut lanes) = (machine.limits, vec![], vec![]);
+    let mut limits = machine.limits;
+    let mut rows = vec![];
+    let mut lanes = vec![];
     let mut behind = vec![];
     for (index, joint) in joints.iter().enumerate() {
         let (row, offset) = (&weights[index], offsets[index]);
@@ -38,7 +40,8 @@ pub fn fold(
             .filter(|axis| row[*axis].abs() > ROUNDING * most)
             .collect();
         if let Some(axis) = joint.axis.filter(|axis| !moving.contains(axis)) {
-            let (letter, name) = (machine.axes.letter(axis), &machine.kinematics.plugin);
+            let letter = machine.axes.letter(axis);
+            let name = &machine.kinematics.plugin;
             let cause = format!("{name} does not move this joint with {letter}");
             return Err(refusal(
                 machine,
@@ -100,7 +103,9 @@ pub fn narrow(
     joint: &Joint,
     (scale, offset): (f64, f64),
 ) -> Result<(), HostError> {
-    let (of, joint_limits, size) = (&mut limits.axes[axis], &joint.limits, scale.abs());
+    let of = &mut limits.axes[axis];
+    let joint_limits = &joint.limits;
+    let size = scale.abs();
     let mut ends = [joint_limits.min_mm, joint_limits.max_mm].map(|end| (end - offset) / scale);
     ends.sort_by(f64::total_cmp);
     (of.min_mm, of.max_mm) = (of.min_mm.max(ends[0]), of.max_mm.min(ends[1]));
@@ -119,7 +124,8 @@ pub fn narrow(
     if of.min_mm < of.max_mm {
         return Ok(());
     }
-    let (letter, name) = (machine.axes.letter(axis), &joint.name);
+    let letter = machine.axes.letter(axis);
+    let name = &joint.name;
     Err(refusal(
         machine,
         &format!("joints.{name}"),

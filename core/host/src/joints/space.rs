@@ -90,7 +90,8 @@ impl JointSpace {
                 lanes: folded.lanes,
             }
         } else {
-            let (limits, lanes) = (fold::behind(machine, &joints)?, (0..joints.len()).collect());
+            let limits = fold::behind(machine, &joints)?;
+            let lanes = (0..joints.len()).collect();
             Self {
                 joints,
                 map: Map::Curved(kinematics),

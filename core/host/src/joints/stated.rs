@@ -54,8 +54,10 @@ fn of_axes(machine: &Machine) -> Result<Stated, HostError> {
 
 /// The joints of a plugin are stated, all of them, in its order.
 fn of_plugin(machine: &Machine, registry: &Registry) -> Result<Stated, HostError> {
-    let (made, name) = (plugin(machine, registry)?, &machine.kinematics.plugin);
-    let (count, stands) = (made.joint_count(machine.axes.count()), machine.joints.len());
+    let made = plugin(machine, registry)?;
+    let name = &machine.kinematics.plugin;
+    let count = made.joint_count(machine.axes.count());
+    let stands = machine.joints.len();
     if !(1..=MAX_AXES).contains(&count) {
         let words = format!("{name} has {count} joints: a machine has 1 to {MAX_AXES}");
         let cause = made
@@ -143,7 +145,8 @@ impl Kinematics for Gantry {
 
     /// Where the joints of an axis differ, it stands in their middle.
     fn to_axes(&self, joints: &AxisVector) -> AxisVector {
-        let (mut axes, mut counts) = (AxisVector::ZERO, [0.0; MAX_AXES]);
+        let mut axes = AxisVector::ZERO;
+        let mut counts = [0.0; MAX_AXES];
         for (joint, axis) in self.axes.iter().enumerate() {
             axes[*axis] += joints[joint];
             counts[*axis] += 1.0;

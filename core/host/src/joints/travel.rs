@@ -90,7 +90,8 @@ impl Travel {
 ///
 /// With the angle φ the sum is `q·cos φ + p·sin φ` and a rise r per radian: it turns where `A·cos(φ + δ) = −r`.
 fn turns(block: &Block, weights: &AxisVector) -> Vec<f64> {
-    let (arc, sign) = (&block.arc, block.arc.sweep_rad.signum());
+    let arc = &block.arc;
+    let sign = block.arc.sweep_rad.signum();
     let plane = arc.plane.map(|axis| axis as usize);
     let [q, p] = plane.map(|axis| arc.radius_mm * weights[axis]);
     let outside = (0..weights.0.len()).filter(|axis| !plane.contains(axis));
@@ -101,7 +102,8 @@ fn turns(block: &Block, weights: &AxisVector) -> Vec<f64> {
     if !(-1.0..=1.0).contains(&level) {
         return vec![];
     }
-    let (phase, swept) = (q.atan2(p), arc.sweep_rad.abs());
+    let phase = q.atan2(p);
+    let swept = arc.sweep_rad.abs();
     let both = [level.acos(), -level.acos()]
         .map(|angle| (sign * (angle - phase - arc.start_angle_rad)).rem_euclid(TAU));
     let inside = both.into_iter().filter(|angle| *angle <= swept);

@@ -86,7 +86,8 @@ fn cause(names: &Names<'_>, kind: &FaultKind, known: Known<'_>) -> String {
             let driver = names.driver(*joint);
             let named = names.joint(*joint);
             let code = names.code_if_any(*joint, *code);
-            let (within_s, state) = (names.drives.describe().enable_s, state_text(*state));
+            let within_s = names.drives.describe().enable_s;
+            let state = state_text(*state);
             format!(
                 "driver {driver}: {named} was not enabled within {within_s} s: its drive is {state}{code}"
             )
@@ -111,12 +112,14 @@ fn cause(names: &Names<'_>, kind: &FaultKind, known: Known<'_>) -> String {
             limit_mm,
         } => names.following(*joint, *error_mm, *limit_mm),
         FaultKind::Kinematics { joint } => {
-            let (joint, plugin) = (names.joint(*joint), &machine.kinematics.plugin);
+            let joint = names.joint(*joint);
+            let plugin = &machine.kinematics.plugin;
             let words = driver.map(|words| format!(": {words}")).unwrap_or_default();
             format!("kinematics {plugin}: the position of {joint} is not a finite number{words}")
         }
         FaultKind::WayBack { axis } => {
-            let (axis, plugin) = (machine.axes.letter(*axis), &machine.kinematics.plugin);
+            let axis = machine.axes.letter(*axis);
+            let plugin = &machine.kinematics.plugin;
             let words = driver.map(|words| format!(": {words}")).unwrap_or_default();
             format!(
                 "kinematics {plugin}: the position of axis {axis} is not a finite number{words}"

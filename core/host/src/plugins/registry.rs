@@ -50,7 +50,8 @@ impl Registry {
     /// # Errors
     /// A plugin of that kind and name is there already.
     pub fn register(&mut self, plugin: Plugin) -> Result<(), String> {
-        let (kind, name) = (plugin.kind(), plugin.name());
+        let kind = plugin.kind();
+        let name = plugin.name();
         if self.named(kind, name).is_some() {
             return Err(format!(
                 "a {} called {name} is registered twice",

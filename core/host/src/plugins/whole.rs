@@ -26,7 +26,8 @@ pub fn check(path: &Path) -> Result<(), String> {
 
 /// The file's length, and its beginning.
 fn head(path: &Path) -> io::Result<(u64, Vec<u8>)> {
-    let (file, mut head) = (File::open(path)?, vec![]);
+    let file = File::open(path)?;
+    let mut head = vec![];
     let bytes = file.metadata()?.len();
     file.take(HEAD).read_to_end(&mut head)?;
     Ok((bytes, head))

@@ -145,7 +145,8 @@ impl Means {
                 / samples.len().max(1) as f64,
             ..*means
         };
-        let (mut speed, mut error) = (AxisVector::ZERO, AxisVector::ZERO);
+        let mut speed = AxisVector::ZERO;
+        let mut error = AxisVector::ZERO;
         let mut most = AxisVector::ZERO.map(|_| f64::NAN);
         for sample in fresh() {
             let now = sample.command - sample.position;

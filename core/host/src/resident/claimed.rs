@@ -71,7 +71,8 @@ impl Claimed {
 
     /// Drives that new drivers have claimed.
     pub fn of(machine: Machine, session: &Session<'_>) -> Result<Self, HostError> {
-        let (registry, switches) = (session.registry, Self::switches(session.clock));
+        let registry = session.registry;
+        let switches = Self::switches(session.clock);
         let mut plugins = Plugins::of(&machine, registry)?;
         plugins.check_staying(&machine, switches)?;
         plugins.add_faults(&machine)?;
@@ -138,7 +139,8 @@ impl Claimed {
         driver: Box<dyn Driver>,
         attached: Attached,
     ) -> Result<Self, HostError> {
-        let (registry, clock) = (session.registry, session.clock);
+        let registry = session.registry;
+        let clock = session.clock;
         let ready = Ready::of_source_on(
             &roster,
             machine.clone(),

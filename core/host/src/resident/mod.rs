@@ -114,7 +114,8 @@ impl<'r> Resident<'r> {
         registry: &'r Registry,
         clock: Clock,
     ) -> Result<Self, HostError> {
-        let (controls, status) = (Arc::<Controls>::default(), Arc::<Status>::default());
+        let controls = Arc::<Controls>::default();
+        let status = Arc::<Status>::default();
         let session = Session {
             registry,
             clock,
@@ -166,7 +167,8 @@ impl<'r> Resident<'r> {
         let claimed = if gone == Gone::Drives && self.stopped.is_some() {
             Claimed::again(machine, &session, self.roster.clone(), &mut self.stopped)?
         } else {
-            (self.stopped, self.watch) = (None, None);
+            self.stopped = None;
+            self.watch = None;
             let mut claimed = Claimed::of(machine, &session)?;
             self.watch = claimed.watch.take();
             claimed
@@ -288,7 +290,8 @@ impl<'r> Resident<'r> {
         memory: &Memory,
         see: &mut dyn FnMut(&Block, Option<Curve<'_>>),
     ) -> Result<PreparedJob, HostError> {
-        let (machine, switches) = (self.machine.clone(), self.on_clock(switches));
+        let machine = self.machine.clone();
+        let switches = self.on_clock(switches);
         let ready = Ready::of_program_on(
             &self.roster,
             machine,
@@ -311,7 +314,8 @@ impl<'r> Resident<'r> {
         source: Box<dyn Source + Send>,
         switches: Switches,
     ) -> Result<PreparedJob, HostError> {
-        let (machine, switches) = (self.machine.clone(), self.on_clock(switches));
+        let machine = self.machine.clone();
+        let switches = self.on_clock(switches);
         // Lines by hand run the machine's own commands too, and wait for them.
         let make = |machine: &Machine| with_user_commands(machine, self.registry, switches, source);
         let ready = Ready::of_source_on(
@@ -347,9 +351,8 @@ impl<'r> Resident<'r> {
         if let Some(apart) = &apart {
             machine = apart.machine.clone();
         }
-        let (name, make) = (Some("homing".to_string()), |machine: &Machine| {
-            homing(machine, None)
-        });
+        let name = Some("homing".to_string());
+        let make = |machine: &Machine| homing(machine, None);
         let ready =
             Ready::of_source_on(&self.roster, machine, self.registry, name, make, switches)?;
         Ok(PreparedJob {
@@ -541,7 +544,8 @@ impl<'r> Resident<'r> {
         soft_loop: &mut SoftLoop<'_>,
     ) -> Result<Option<tandem_fine::JobEnd>, HostError> {
         let patience = (PATIENCE_S / self.machine.fine_period_s) as u64;
-        let (mut passed_s, mut stuck) = (f64::NAN, 0);
+        let mut passed_s = f64::NAN;
+        let mut stuck = 0;
         while self.engine.is_attaching() {
             self.tick(soft_loop);
         }
@@ -564,7 +568,8 @@ impl<'r> Resident<'r> {
             let now_s = self.status.program_time_s.load();
             let waits = soft_loop.is_waiting() || self.status.spindle.waits.load(Relaxed);
             if now_s != passed_s || waits || soft_loop.is_attended() {
-                (passed_s, stuck) = (now_s, 0);
+                passed_s = now_s;
+                stuck = 0;
             } else if stuck > patience {
                 soft_loop.give_up();
             }

@@ -147,7 +147,8 @@ impl Run {
         let mut driver: Box<dyn Driver> = driver;
         let mut squaring = None;
         if let Some(homing) = homing {
-            let (machine, roster) = (&ready.machine, ready.claim.roster());
+            let machine = &ready.machine;
+            let roster = ready.claim.roster();
             squaring = Some(Squaring::of(
                 machine,
                 registry,
@@ -252,7 +253,8 @@ impl Run {
         }
         self.exchange.measures.store(clock == Clock::Wall, Relaxed);
         let joints = Arc::clone(&self.job.joints);
-        let (mut job, mut fine) = (self.job, self.fine);
+        let mut job = self.job;
+        let mut fine = self.fine;
         let periods = periods(&job.machine);
         let watch = self.watch.as_ref().map(HangWatch::for_fine);
         let first = match (self.squaring, clock) {
@@ -264,7 +266,8 @@ impl Run {
             }
         };
         let (mut soft_loop, conclusion) = job.begin(clock, observer);
-        let (mut measured, mut words) = (None, None);
+        let mut measured = None;
+        let mut words = None;
         let fine = match (first, clock) {
             (Squared::Here(mut fine), Clock::Virtual) => {
                 let per_rough = conclusion.machine.fine_periods_per_rough;

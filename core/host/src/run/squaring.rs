@@ -66,9 +66,8 @@ impl Squaring {
             for joint in 0..apart.axes.count() {
                 apart.start[joint] = attached.position[joint];
             }
-            let (name, make) = (Some("homing".to_string()), |machine: &Machine| {
-                homing(machine, None)
-            });
+            let name = Some("homing".to_string());
+            let make = |machine: &Machine| homing(machine, None);
             Ready::of_source_on(roster, apart, registry, name, make, switches)
         });
         let ready = match ready {

@@ -123,7 +123,8 @@ impl Plugins {
     /// # Errors
     /// What does not go together, with its place in the machine file.
     pub fn check(&self, machine: &Machine, switches: Switches) -> Result<(), HostError> {
-        let (joints, drivers) = (&self.joints, self.claim.roster());
+        let joints = &self.joints;
+        let drivers = self.claim.roster();
         rules::check(machine, &self.planner.describe(), &drivers)?;
         rules::check_homing(machine, joints, switches, self.claim.is_elsewhere())?;
         // A driver that has panicked says so here, and of what it is nothing is known.

@@ -19,7 +19,8 @@ pub fn with_stand_ins(
     registry: &Registry,
     ideal: Option<&str>,
 ) -> Result<(Machine, Vec<String>), HostError> {
-    let (mut machine, mut notes) = (machine.clone(), vec![]);
+    let mut machine = machine.clone();
+    let mut notes = vec![];
     for index in 0..machine.drivers.len() {
         let driver = &machine.drivers[index];
         if !is_real(driver, registry) {

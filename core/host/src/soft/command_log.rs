@@ -21,7 +21,8 @@ impl CommandLog {
     pub fn sample(&mut self, sample: &Sample) -> Option<impl Iterator<Item = Timed> + use<>> {
         // Hardly any sample has one.
         (sample.given != self.last).then(|| {
-            let (tick, last) = (sample.tick, std::mem::replace(&mut self.last, sample.given));
+            let tick = sample.tick;
+            let last = std::mem::replace(&mut self.last, sample.given);
             changes(&last, &sample.given).map(move |command| Timed { tick, command })
         })
     }

@@ -168,7 +168,8 @@ impl<'a> SoftLoop<'a> {
 
     /// The rough loop, and who looks at what it does.
     fn with_tee(&mut self) -> (&mut RoughLoop, Tee<'_>) {
-        let (aborted, skips_homing) = (&mut self.aborted, self.skips_homing);
+        let aborted = &mut self.aborted;
+        let skips_homing = self.skips_homing;
         (
             &mut self.rough,
             Tee {
@@ -312,7 +313,8 @@ impl<'a> SoftLoop<'a> {
 
     /// Asks the operator where the program has stopped for one, then goes on.
     pub fn serve_stop(&mut self) {
-        let (status, controls) = (&self.host.status, &self.host.controls);
+        let status = &self.host.status;
+        let controls = &self.host.controls;
         if controls.program_hold.load(Relaxed) && status.feed_mm_per_s.load() == 0.0 {
             let line = status.line.load(Relaxed);
             match self.observer.program_stop(line) {

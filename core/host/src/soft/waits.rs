@@ -57,7 +57,8 @@ impl Waits {
             return spindle::awaited(status).map(|words| format!("waits for {words} …"));
         }
         if !status.enabling.load(Relaxed) {
-            (self.enabling_periods, self.enabling) = (0, None);
+            self.enabling_periods = 0;
+            self.enabling = None;
             return None;
         }
         self.enabling_periods += 1;

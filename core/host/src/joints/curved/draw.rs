@@ -49,7 +49,8 @@ pub fn as_planned(
     axes: &Axes,
     sink: &mut dyn SegmentSink,
 ) {
-    let (mut segment, count) = (*from, axes.count());
+    let mut segment = *from;
+    let count = axes.count();
     for point in intervals.iter().flat_map(|i| [&i.start, &i.end]) {
         let left = point.deceleration(1.0);
         segment.stop_deceleration_mm_per_s2 = segment.stop_deceleration_mm_per_s2.min(left);

@@ -206,7 +206,8 @@ impl CurvedJoints {
             draw::as_planned(&segment, &intervals, &self.space, &self.axes, sink);
             return segment.duration_s;
         }
-        let (mut begins_s, mut took_s) = (0.0, 0.0);
+        let mut begins_s = 0.0;
+        let mut took_s = 0.0;
         for (i, interval) in intervals.iter().enumerate() {
             let stretch = Stretch {
                 from: &segment,

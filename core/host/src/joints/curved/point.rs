@@ -137,7 +137,8 @@ fn behind(vector: &mut AxisVector, axes: usize, joints: &AxisVector, count: usiz
 impl State {
     /// The plan in `segment` at its local time `t_s`.
     pub fn of(segment: &Segment, t_s: f64, space: &JointSpace, axes: &Axes) -> Self {
-        let (count, joints) = (axes.count(), space.count());
+        let count = axes.count();
+        let joints = space.count();
         let [mut position, mut velocity, mut acceleration] = [AxisVector::ZERO; 3];
         for (axis, coefficients) in segment.coefficients[..count].iter().enumerate() {
             [position[axis], velocity[axis], acceleration[axis]] = evaluate(coefficients, t_s);
