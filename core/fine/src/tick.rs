@@ -39,7 +39,7 @@ use crate::ramp::Ramp;
 use crate::state::{self, Input};
 use actuation::Actuation;
 use attach::Watched;
-use drives::Told;
+use drives::SetpointExtras;
 use govern::Ask;
 use hand_over::{Found, HandOver};
 use missed::Missed;
@@ -590,7 +590,7 @@ impl FineLoop {
         let hand = self.phase.hand();
         self.actuation
             .set_joints(&self.config, axes, hand, may_hold, lets_go);
-        let told = Told {
+        let extras = SetpointExtras {
             arm: self.stops.arm(),
             // Where axes are homed, joints are axes.
             limited: self.outputs.unhomed & self.config.homing_limits,
@@ -603,7 +603,7 @@ impl FineLoop {
         };
         let exchanged = self
             .actuation
-            .exchange(self.tick, &told, &mut self.plugin_error);
+            .exchange(self.tick, &extras, &mut self.plugin_error);
         let drives = self.actuation.drives();
         self.roles.hear(exchanged.failed);
         self.spin_up.hear(drives, &self.config);

@@ -6,11 +6,11 @@ mod depth;
 mod doubles;
 mod easing;
 mod gather;
+mod junction_steps;
 mod policy;
 mod queue;
 mod rest;
 mod rough;
-mod seams;
 mod source;
 mod window;
 

@@ -11,7 +11,7 @@ use tandem_sdk::{
 
 use crate::Observer;
 use crate::depth::{QueueDepth, SERVED_FOR_PERIODS};
-use crate::seams::Seams;
+use crate::junction_steps::JunctionSteps;
 
 /// Collects what the planner emits, ties events to their place, and moves it into the ring as there is room.
 pub struct Queue {
@@ -40,13 +40,13 @@ pub struct Queue {
     ends_at_rest: bool,
     /// What was emitted last ends at rest.
     plan_rests: bool,
-    seams: Seams,
+    junction_steps: JunctionSteps,
     defect: Option<&'static str>,
 }
 
 impl Queue {
     /// An empty queue.
-    pub fn new(end: RoughEnd, depth: QueueDepth, seams: Seams) -> Self {
+    pub fn new(end: RoughEnd, depth: QueueDepth, junction_steps: JunctionSteps) -> Self {
         Self {
             end,
             depth,
@@ -63,7 +63,7 @@ impl Queue {
             queued_s: 0.0,
             ends_at_rest: true,
             plan_rests: true,
-            seams,
+            junction_steps,
             defect: None,
         }
     }
@@ -85,7 +85,7 @@ impl Queue {
     /// Forgets all that was queued behind `rest`, and begins the next epoch there.
     pub fn restart(&mut self, rest: &Rest) {
         self.epoch = rest.epoch + 1;
-        self.seams.restart();
+        self.junction_steps.restart();
         self.path_start_mm = rest.path_mm;
         (self.emitted_s, self.queued_s, self.ends_at_rest) =
             (rest.program_time_s, rest.program_time_s, true);
@@ -283,7 +283,7 @@ impl SegmentSink for Queue {
         {
             (marked.epoch, marked.stop_on) = (self.epoch, stop_on);
             marked.path[0] += self.path_start_mm;
-            if self.seams.steps_at(segment) {
+            if self.junction_steps.is_step_at(segment) {
                 marked.flags = marked.flags.with(SegmentFlags::STEPS);
             }
         }

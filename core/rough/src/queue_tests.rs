@@ -6,14 +6,14 @@ use tandem_sdk::{AxisVector, Curve};
 use super::*;
 use crate::doubles::{block_of, report, rest};
 use crate::easing::Easing;
-use crate::seams::ROUNDING;
+use crate::junction_steps::ROUNDING;
 
 const PERIOD_S: f64 = 0.01;
 
 fn queue() -> (Queue, FineEnd) {
     let (rough, fine, _host) = bridge(Sizes::default());
     let depth = QueueDepth::new(PERIOD_S, 0.001, 1.0, Easing::NONE);
-    (Queue::new(rough, depth, Seams::new(ROUNDING)), fine)
+    (Queue::new(rough, depth, JunctionSteps::new(ROUNDING)), fine)
 }
 
 /// A segment of a block at 50 mm/s along the first axis that leaves 100 mm/s², with a jerk limit.

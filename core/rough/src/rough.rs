@@ -8,8 +8,8 @@ use crate::Observer;
 use crate::depth::{QueueDepth, SERVED_FOR_PERIODS};
 use crate::easing::Easing;
 use crate::gather::{Gathering, Slowness};
+use crate::junction_steps::{JunctionSteps, ROUNDING};
 use crate::queue::Queue;
-use crate::seams::{ROUNDING, Seams};
 use crate::source::Source;
 
 /// Shares of the limits of acceleration and of jerk from which on what samples show of a step counts: half of what the fine loop
@@ -177,7 +177,7 @@ impl RoughLoop {
                     config.depth_factor,
                     config.easing,
                 ),
-                Seams::new(config.seam_rounding),
+                JunctionSteps::new(config.seam_rounding),
             ),
             items: Vec::new(),
             next: 0,

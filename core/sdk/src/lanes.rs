@@ -183,6 +183,12 @@ mod tests {
         Limits::new(&of.iter().map(each).collect::<Vec<_>>()).unwrap()
     }
 
+    fn narrowed_accelerations(all: &Limits) -> Vec<f64> {
+        let narrow = belts().narrowed(all);
+        let axes = narrow.axes().iter();
+        axes.map(|axis| axis.acceleration_mm_per_s2).collect()
+    }
+
     #[test]
     fn axes_share_what_a_lane_has() {
         let none = f64::INFINITY;
@@ -222,13 +228,7 @@ mod tests {
             [7.0, 400.0],
             [23_000.0, 1e5],
         ]);
-        let narrow = belts().narrowed(&all);
-        let most: Vec<f64> = narrow
-            .axes()
-            .iter()
-            .map(|axis| axis.acceleration_mm_per_s2)
-            .collect();
-        assert_eq!(most[..2], [3.5, 3.5]);
+        assert_eq!(narrowed_accelerations(&all)[..2], [3.5, 3.5]);
         let all = limits(&[
             [14.0, 1e3],
             [27_000.0, 1e5],
@@ -236,13 +236,7 @@ mod tests {
             [7014.0, 400.0],
             [23_000.0, 1e5],
         ]);
-        let narrow = belts().narrowed(&all);
-        let most: Vec<f64> = narrow
-            .axes()
-            .iter()
-            .map(|axis| axis.acceleration_mm_per_s2)
-            .collect();
-        assert_eq!(most[..2], [14.0, 7000.0]);
+        assert_eq!(narrowed_accelerations(&all)[..2], [14.0, 7000.0]);
     }
 
     #[test]

@@ -6,12 +6,12 @@ use ethercrab::subdevice_group::DcConfiguration;
 use ethercrab::{Command, DcSync, MainDevice, SubDeviceGroup};
 use tandem_sdk::DriverContext;
 
-use crate::beside::Mailboxes;
 use crate::check::MAX_DEVICES;
 use crate::clock::Leading;
 use crate::coe::{MAX_REPEATS, Objects, caught, may_pass};
 use crate::cyclic::{Area, Station};
 use crate::drive::{self, Constants, Drive, Moves};
+use crate::mailboxes::Mailboxes;
 use crate::options::{DeviceOptions, MapBy, Options, Sync, object, pair};
 use crate::reactions::REACTIONS;
 use crate::time;

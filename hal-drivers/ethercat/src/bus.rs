@@ -9,17 +9,17 @@ use tandem_sdk::{
     Attached, AxisVector, DriverContext, Feedback, JointState, MAX_AXES, MAX_DIGITAL, Setpoint,
 };
 
-use crate::beside::Mailboxes;
 use crate::bring_up::{self, Ready, refuses};
 use crate::check::emulated;
 use crate::clock::{Leading, phase};
 use crate::cyclic::Cyclic;
 use crate::drive::{Drive, Moves};
 use crate::link::Link;
+use crate::mailboxes::Mailboxes;
 use crate::master::Master;
 use crate::member::{Member, OP};
 use crate::options::{EMULATED, Encoder, Options, Sync};
-use crate::requests::{Desk, Request};
+use crate::requests::{ObjectServer, Request};
 use crate::survey::{Object, Value};
 use crate::time;
 use crate::words::{al_code, al_state, own};
@@ -623,8 +623,8 @@ impl Bus {
     }
 
     /// Where other processes ask for objects; none where the bus is emulated.
-    pub(crate) fn desk(&self) -> Option<Desk> {
-        self.link.lock().and_then(Desk::at)
+    pub(crate) fn server(&self) -> Option<ObjectServer> {
+        self.link.lock().and_then(ObjectServer::at)
     }
 
     /// How every device is, for people who watch.

@@ -13,7 +13,7 @@ use tandem_sdk::{
 use crate::bus::{Bus, Counters};
 use crate::check;
 use crate::options::{DeviceOptions, EMULATED, Options, number};
-use crate::requests::{Desk, Request};
+use crate::requests::{ObjectServer, Request};
 use crate::survey::Value;
 use crate::words::{joint_code, own};
 
@@ -68,13 +68,13 @@ impl Shared {
     }
 
     /// Goes on with objects that are asked for, where nobody has the bus; whether any is.
-    fn serve(&self, desk: Option<&mut Desk>) -> bool {
+    fn serve(&self, server: Option<&mut ObjectServer>) -> bool {
         let Ok(mut bus) = self.bus.try_lock() else {
             return true;
         };
-        let is_served = desk.is_some_and(|desk| {
-            desk.look(&mut bus);
-            desk.is_busy()
+        let is_served = server.is_some_and(|server| {
+            server.look(&mut bus);
+            server.is_busy()
         });
         if bus.is_asked() {
             bus.work_beside();
@@ -176,13 +176,13 @@ impl EthercatDrives {
             .name("ethercat".to_string())
             .spawn(move || {
                 ask_for_priority();
-                let mut desk = shared.bus().desk();
+                let mut server = shared.bus().server();
                 while !shared.ends.load(Ordering::Relaxed) {
                     let begun = Instant::now();
                     let heard_ns = shared.heard_ns.load(Ordering::Acquire);
                     let since_ns = shared.now_ns().saturating_sub(heard_ns);
                     if heard_ns > 0 && since_ns <= silent_ns {
-                        let at_work = shared.serve(desk.as_mut());
+                        let at_work = shared.serve(server.as_mut());
                         // Nothing is to be done before, and the fine loop has the computer for itself.
                         let left = Duration::from_nanos(silent_ns - since_ns);
                         let nap = left.clamp(period, MAX_NAP);
@@ -192,7 +192,7 @@ impl EthercatDrives {
                     if let Ok(mut bus) = shared.bus.try_lock() {
                         bus.keep_alive();
                     }
-                    shared.serve(desk.as_mut());
+                    shared.serve(server.as_mut());
                     std::thread::sleep(period.saturating_sub(begun.elapsed()));
                 }
             })

@@ -9,7 +9,6 @@
     reason = "the futures of ethercrab hold its group of devices"
 )]
 
-mod beside;
 mod bring_up;
 mod bus;
 mod check;
@@ -19,6 +18,7 @@ mod cyclic;
 mod drive;
 mod driver;
 mod link;
+mod mailboxes;
 mod map;
 mod master;
 mod member;

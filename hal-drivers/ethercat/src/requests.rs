@@ -98,7 +98,7 @@ pub fn ask_whoever_drives(interface: &str, request: &Request) -> Option<Result<V
 
 /// Whoever asks for objects, one at a time. It is looked at between exchanges, and never waited for.
 #[derive(Debug)]
-pub(crate) struct Desk {
+pub(crate) struct ObjectServer {
     listener: UnixListener,
     client: Option<Client>,
 }
@@ -112,7 +112,7 @@ struct Client {
     asked: bool,
 }
 
-impl Desk {
+impl ObjectServer {
     /// At the lock of the interface; none where that cannot be looked at without waiting.
     pub(crate) fn at(lock: &UnixListener) -> Option<Self> {
         let listener = lock.try_clone().ok()?;

@@ -4,7 +4,7 @@
 use tandem_sdk::{AxisVector, Driver, Kinematics, PluginError};
 
 use super::attach::{Attach, Watched};
-use super::drives::{Drives, Exchanged, Told};
+use super::drives::{Drives, Exchanged, SetpointExtras};
 use super::hand_over::{Found, HandOver};
 use super::joints::{self, JointSpace};
 use crate::config::{FineConfig, Joints};
@@ -188,16 +188,16 @@ impl Actuation {
         self.drives.tell_to_hold(!lets_go, false);
     }
 
-    /// Sends the setpoint in fine period `tick`, with what is `told` beside positions. The first words of a plugin that fails are
+    /// Sends the setpoint in fine period `tick`, with the `extras` besides positions. The first words of a plugin that fails are
     /// kept in `words`.
     #[inline]
     pub(super) fn exchange(
         &mut self,
         tick: u64,
-        told: &Told,
+        extras: &SetpointExtras,
         words: &mut Option<PluginError>,
     ) -> Exchanged {
-        self.drives.tell(told);
+        self.drives.tell(extras);
         self.drives.exchange(tick, words)
     }
 

@@ -19,8 +19,8 @@ pub(super) struct Exchanged {
     pub(super) age_periods: u32,
 }
 
-/// What the drives are told beside where their joints are to be.
-pub(super) struct Told {
+/// What a setpoint holds besides positions.
+pub(super) struct SetpointExtras {
     /// What they are to catch.
     pub(super) arm: Arm,
     /// Bit per joint whose drive keeps to a torque limit.
@@ -113,13 +113,13 @@ impl Drives {
         )
     }
 
-    /// Puts into the setpoint what it holds beside positions.
+    /// Puts into the setpoint what it holds besides positions.
     #[inline]
-    pub(super) fn tell(&mut self, told: &Told) {
-        self.setpoint.arm = told.arm;
-        self.setpoint.limited = told.limited;
-        self.setpoint.outputs = told.outputs;
-        self.setpoint.spindle_rad_per_s = told.spindle_rad_per_s;
+    pub(super) fn tell(&mut self, extras: &SetpointExtras) {
+        self.setpoint.arm = extras.arm;
+        self.setpoint.limited = extras.limited;
+        self.setpoint.outputs = extras.outputs;
+        self.setpoint.spindle_rad_per_s = extras.spindle_rad_per_s;
     }
 
     /// Puts into the setpoint whether the drives are to hold, and whether their faults are to be reset.

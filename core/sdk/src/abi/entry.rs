@@ -99,14 +99,14 @@ impl CallGuard {
 }
 
 thread_local! {
-    static PANICKED: Panicked = const { Panicked(RefCell::new(Told { place: String::new(), words: String::new() })) };
+    static PANICKED: Panicked = const { Panicked(RefCell::new(PanicText { place: String::new(), words: String::new() })) };
 }
 
 /// The last panic of this thread, until the error of a call has it.
-struct Panicked(RefCell<Told>);
+struct Panicked(RefCell<PanicText>);
 
 #[derive(Default)]
-struct Told {
+struct PanicText {
     place: String,
     words: String,
 }
@@ -114,7 +114,7 @@ struct Told {
 impl Drop for Panicked {
     /// No call has it: it is the end of a thread that a plugin has started, and nothing else tells of that.
     fn drop(&mut self) {
-        let Told { place, words } = self.0.get_mut();
+        let PanicText { place, words } = self.0.get_mut();
         if !place.is_empty() {
             crate::log!(Error, "a thread of a plugin panicked{place}: {words}");
         }
@@ -151,7 +151,7 @@ fn keep_place(info: &PanicHookInfo<'_>) {
         .unwrap_or_default();
     let words = info.payload_as_str().unwrap_or("without words").to_string();
     // At the very end of a thread there is no place for it any more.
-    let _ = PANICKED.try_with(|panicked| panicked.0.replace(Told { place, words }));
+    let _ = PANICKED.try_with(|panicked| panicked.0.replace(PanicText { place, words }));
 }
 
 /// A function or closure that captures nothing, made from its type: it has no data.

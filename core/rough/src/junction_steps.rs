@@ -7,14 +7,14 @@ pub const ROUNDING: [f64; 2] = [1e-4, 0.1];
 
 /// How the last segment ended.
 #[derive(Clone, Copy, Debug)]
-pub struct Seams {
+pub struct JunctionSteps {
     /// Velocity and acceleration; none at a rest, and of plans that keep no jerk.
     end: Option<[AxisVector; 2]>,
     /// Steps up to these do not count: of velocity, mm/s, and of acceleration, mm/s².
     rounding: [f64; 2],
 }
 
-impl Seams {
+impl JunctionSteps {
     /// Behind a rest.
     pub fn new(rounding: [f64; 2]) -> Self {
         Self {
@@ -29,7 +29,7 @@ impl Seams {
     }
 
     /// Whether velocity or acceleration step where `segment` begins, which follows the last one.
-    pub fn steps_at(&mut self, segment: &Segment) -> bool {
+    pub fn is_step_at(&mut self, segment: &Segment) -> bool {
         let before = self.end.take();
         if segment.order < 3 || segment.duration_s == 0.0 {
             return false;
@@ -72,19 +72,19 @@ mod tests {
 
     #[test]
     fn steps_are_found_where_segments_meet() {
-        let mut seams = Seams::new(ROUNDING);
+        let mut junction_steps = JunctionSteps::new(ROUNDING);
         // At its end the velocity is 4, the acceleration 8.
         assert!(
-            !seams.steps_at(&segment([0.0, 0.0, 4.0, 0.0, 0.0, 0.0])),
+            !junction_steps.is_step_at(&segment([0.0, 0.0, 4.0, 0.0, 0.0, 0.0])),
             "after a rest nothing steps"
         );
         assert!(
-            !seams.steps_at(&segment([1.0, 4.0, 4.0, -1.0, 0.0, 0.0])),
+            !junction_steps.is_step_at(&segment([1.0, 4.0, 4.0, -1.0, 0.0, 0.0])),
             "it goes on"
         );
         let end = derivatives(&segment([1.0, 4.0, 4.0, -1.0, 0.0, 0.0]), 0.5).map(|v| v[1]);
         assert!(
-            seams.steps_at(&segment([0.0, end[0], end[1] / 2.0 + 0.2, 0.0, 0.0, 0.0])),
+            junction_steps.is_step_at(&segment([0.0, end[0], end[1] / 2.0 + 0.2, 0.0, 0.0, 0.0])),
             "acceleration steps"
         );
         let end = derivatives(
@@ -93,20 +93,20 @@ mod tests {
         )
         .map(|v| v[1]);
         assert!(
-            seams.steps_at(&segment([0.0, end[0] + 1e-3, end[1] / 2.0, 0.0, 0.0, 0.0])),
+            junction_steps.is_step_at(&segment([0.0, end[0] + 1e-3, end[1] / 2.0, 0.0, 0.0, 0.0])),
             "velocity steps"
         );
-        assert!(!seams.steps_at(&Segment::rest(&AxisVector::ZERO, 0.0)));
+        assert!(!junction_steps.is_step_at(&Segment::rest(&AxisVector::ZERO, 0.0)));
         assert!(
-            !seams.steps_at(&segment([0.0, 0.0, 4.0, 0.0, 0.0, 0.0])),
+            !junction_steps.is_step_at(&segment([0.0, 0.0, 4.0, 0.0, 0.0, 0.0])),
             "nor behind a rest"
         );
         // What is rounding on fast machines is a part of what a slow one may.
         for (rounding, counts) in [(ROUNDING, false), ([1e-6, 3e-4], true)] {
-            let mut seams = Seams::new(rounding);
-            assert!(!seams.steps_at(&segment([0.0, 0.0, 4.0, 0.0, 0.0, 0.0])));
+            let mut junction_steps = JunctionSteps::new(rounding);
+            assert!(!junction_steps.is_step_at(&segment([0.0, 0.0, 4.0, 0.0, 0.0, 0.0])));
             assert_eq!(
-                seams.steps_at(&segment([1.0, 4.0 + 5e-5, 4.0, 0.0, 0.0, 0.0])),
+                junction_steps.is_step_at(&segment([1.0, 4.0 + 5e-5, 4.0, 0.0, 0.0, 0.0])),
                 counts
             );
         }
