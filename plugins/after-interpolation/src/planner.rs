@@ -15,7 +15,8 @@ use crate::options::Options;
 /// Most blocks that wait to be driven. The filter does not look ahead, so there is no use in more.
 pub const BUFFER_BLOCKS: usize = 256;
 
-/// Share of an axis limit that a feed may reach.
+/// Share of an axis limit that a feed may reach. With half and with twice as much a rapid is not at the limits of its axes
+/// (`blocks_are_planned_at_the_highest_ratio_and_within_axis_speeds`).
 const AIM: f64 = 0.999;
 
 /// A block that has not begun.
