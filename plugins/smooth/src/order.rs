@@ -294,6 +294,19 @@ pub(crate) mod tests {
         assert!(in_order(&once, &once));
     }
 
+    /// A sample has a place where it is as near to the path as is said of it, or within tolerance.
+    #[test]
+    fn a_sample_that_is_farther_off_than_is_said_of_it_has_no_place() {
+        let chords = lines(&[[0.0, 0.0], [1.0, 0.0]]);
+        let run = open(&chords);
+        for (off, follows) in [(0.8, true), (1.5, false)] {
+            let samples = [[0.0, 0.0], [0.5, off * TOLERANCE], [1.0, 0.0]];
+            let nearness = [0.1, 0.9, 0.1];
+            let found = Order::default().walk(&run, (&samples, &nearness), 0, (0, run.end()));
+            assert_eq!(found, follows, "{off}");
+        }
+    }
+
     /// Where the path turns back and comes by again, the samples before a window are not those that pass the vertices in it.
     #[test]
     fn samples_before_a_window_pass_no_vertex_behind_its_start() {
