@@ -502,25 +502,29 @@ pub(super) mod tests {
         }
     }
 
-    /// Y is slow to turn round and decides how the rate goes down; of the jerk that it is to have, the plan's own is a part, as it is
-    /// driven at the third power of the rate.
-    #[test]
-    fn the_jerk_of_the_plan_counts_in_the_stop_of_the_slowest_axis() {
-        const SIGMA: f64 = 0.5;
+    const SIGMA: f64 = 0.5;
+
+    /// σ̈ that Y asks for, which is slow to turn round, on the way to rest from `path` along X.
+    fn wanted_by_y(path: [f64; 3], y: [f64; 6], rate_per_s: f64) -> f64 {
         let mut limits = limits(1000.0, 1e6);
         limits[1].jerk_mm_per_s3 = 1000.0;
-        let path = [50.0, 100.0, 0.0];
+        let mut segment = along_x(path, 0.2);
+        segment.coefficients[1] = y;
+        let ahead = Ahead::new(&segment, Some(0.0), 0, None);
+        let mut horizon = Horizon::new(&limits, 2, PERIOD_S);
+        horizon.fill(&ahead, PERIOD_S);
+        let mut governor = Governor::new(&limits, 2, PERIOD_S);
+        (governor.sigma, governor.rate_per_s) = (SIGMA, rate_per_s);
+        governor.wanted_by_slowest(&to_rest_from(path), &horizon, &ahead.place(TWO_LINEAR))
+    }
+
+    /// Y decides how the rate goes down; of the jerk that it is to have, the plan's own is a part, as it is driven at the third power of
+    /// the rate.
+    #[test]
+    fn the_jerk_of_the_plan_counts_in_the_stop_of_the_slowest_axis() {
         let driven = |jerk: f64| {
-            let mut segment = along_x(path, 0.2);
-            segment.coefficients[1] = [0.0, 0.5, 50.0, jerk / 6.0, 0.0, 0.0];
-            let ahead = Ahead::new(&segment, Some(0.0), 0, None);
-            let mut horizon = Horizon::new(&limits, 2, PERIOD_S);
-            horizon.fill(&ahead, PERIOD_S);
-            let mut governor = Governor::new(&limits, 2, PERIOD_S);
-            (governor.sigma, governor.rate_per_s) = (SIGMA, -0.5);
-            let place = ahead.place(TWO_LINEAR);
-            let change = governor.wanted_by_slowest(&to_rest_from(path), &horizon, &place);
-            SIGMA.powi(3) * jerk + 0.5 * change
+            let y = [0.0, 0.5, 50.0, jerk / 6.0, 0.0, 0.0];
+            SIGMA.powi(3) * jerk + 0.5 * wanted_by_y([50.0, 100.0, 0.0], y, -0.5)
         };
         let without = driven(0.0);
         assert!(without.is_finite(), "Y decides");
@@ -534,32 +538,19 @@ pub(super) mod tests {
     /// with the same jerk.
     #[test]
     fn the_acceleration_of_the_plan_counts_in_the_stop_of_the_slowest_axis() {
-        const SIGMA: f64 = 0.5;
-        let mut limits = limits(1000.0, 1e6);
-        limits[1].jerk_mm_per_s3 = 1000.0;
-        let path = [50.0, 0.0, 0.0];
         let driven = |turning: f64| {
-            let mut segment = along_x(path, 0.2);
-            segment.coefficients[1] = [0.0, 0.5, turning / 2.0, 0.0, 0.0, 0.0];
-            let ahead = Ahead::new(&segment, Some(0.0), 0, None);
-            let mut horizon = Horizon::new(&limits, 2, PERIOD_S);
-            horizon.fill(&ahead, PERIOD_S);
-            let mut governor = Governor::new(&limits, 2, PERIOD_S);
+            let y = [0.0, 0.5, turning / 2.0, 0.0, 0.0, 0.0];
             // Y accelerates by 20 mm/s².
             let rate_per_s = (20.0 - SIGMA * SIGMA * turning) / 0.5;
-            (governor.sigma, governor.rate_per_s) = (SIGMA, rate_per_s);
-            let place = ahead.place(TWO_LINEAR);
-            let change = governor.wanted_by_slowest(&to_rest_from(path), &horizon, &place);
+            let change = wanted_by_y([50.0, 0.0, 0.0], y, rate_per_s);
             3.0 * SIGMA * turning * rate_per_s + 0.5 * change
         };
         let without = driven(80.0);
         assert!(without.is_finite(), "Y decides");
         for turning in [81.0, 82.0, 84.0] {
             let with = driven(turning);
-            assert!(
-                (with - without).abs() < 1e-6,
-                "{turning}: {with}, {without}"
-            );
+            let differs = (with - without).abs();
+            assert!(differs < 1e-6, "{turning}: {with}, {without}");
         }
     }
 
@@ -567,7 +558,6 @@ pub(super) mod tests {
     /// an axis decides where it needs so much more, and two periods.
     #[test]
     fn an_axis_decides_how_a_stop_begins_where_it_needs_clearly_longer_than_the_path() {
-        const SIGMA: f64 = 0.5;
         let path = [50.0, 100.0, 0.0];
         let mut is_near = [false; 2];
         for n in 0..200 {

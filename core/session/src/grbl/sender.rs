@@ -160,12 +160,9 @@ impl Sender {
     }
 
     pub(super) fn status(&mut self) {
+        let waiting = self.dispatcher.with_lines(|lines| lines.count_waiting());
         let free = Free {
-            lines: PLACES
-                - self
-                    .dispatcher
-                    .with_lines(|lines| lines.count_waiting())
-                    .min(PLACES),
+            lines: PLACES - waiting.min(PLACES),
             bytes: RX_BYTES.saturating_sub(self.bytes + self.scanner.bytes()),
         };
         let report = self
