@@ -5,6 +5,9 @@ use wasmtime::{ExternType, Module, ValType};
 use crate::abi;
 use crate::error::Refusal;
 
+/// Characters of a name of the module that a message repeats.
+const MAX_SHOWN: usize = 64;
+
 /// A compiled policy script. Clones share the code.
 #[derive(Clone)]
 pub struct Script {
@@ -29,7 +32,7 @@ impl Script {
     pub(crate) fn new(module: Module) -> Result<Self, Refusal> {
         let imports: Vec<String> = module
             .imports()
-            .map(|i| format!("{}.{}", i.module(), i.name()))
+            .map(|i| format!("{}.{}", shown(i.module()), shown(i.name())))
             .take(8)
             .collect();
         if !imports.is_empty() {
@@ -151,6 +154,11 @@ fn signature(takes: &[Number], gives: &[Number]) -> String {
     }
 }
 
+/// A name that a module states, made fit to stand in a message: it may hold line breaks, and be longer than the module's code.
+fn shown(name: &str) -> String {
+    name.escape_debug().take(MAX_SHOWN).collect()
+}
+
 /// Name of the export of the layout in `version`.
 pub(crate) fn layout_export(version: u32) -> &'static str {
     abi::LAYOUT_EXPORTS[version as usize - 1]
@@ -169,7 +177,9 @@ fn version(module: &Module) -> Result<u32, Refusal> {
         .exports()
         .find_map(|e| e.name().strip_prefix(abi::LAYOUT_PREFIX).map(str::to_owned));
     match other {
-        Some(version) => Err(Refusal::OtherVersion(version.chars().take(12).collect())),
+        Some(version) => Err(Refusal::OtherVersion(
+            version.escape_debug().take(12).collect(),
+        )),
         // What it lacks is told with what else it lacks.
         None => Ok(abi::VERSION),
     }

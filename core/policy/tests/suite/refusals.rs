@@ -101,6 +101,20 @@ fn refusals_say_what_is_missing_and_which_version() {
 }
 
 #[test]
+fn names_of_any_kind_stand_on_one_line_of_a_refusal() {
+    let long = "n".repeat(5000);
+    let text = format!(r#"(module (import "\0a " "{long}" (func)))"#);
+    let text = start(text.as_bytes(), &[]).err().unwrap().to_string();
+    assert!(
+        text.starts_with(r"it imports \n .nnn") && text.len() < 200,
+        "{text}"
+    );
+    let text = r#"(module (func (export "tandem_policy_v\0a") (result i32) i32.const 0))"#;
+    let text = start(text.as_bytes(), &[]).err().unwrap().to_string();
+    assert!(text.starts_with(r"it speaks version \n of"), "{text}");
+}
+
+#[test]
 fn parameters_that_do_not_fit_are_refused() {
     let bytes = read("scripts/policies/corner-time-constant.wasm");
     let refused = |stated: &[(&str, f64)]| {
