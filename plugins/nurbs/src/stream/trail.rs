@@ -385,3 +385,131 @@ fn shift(c: &[f64; 6], base: f64, t: f64) -> [f64; 6] {
     }
     shifted
 }
+
+#[cfg(test)]
+mod tests {
+    use tandem_rig::{Random, axis, context};
+    use tandem_sdk::AxisVector;
+
+    use super::*;
+
+    const PERIOD_S: f64 = 1.3e-3;
+    const JERK: f64 = 2e4;
+    const WEIGHTS: [[f64; 4]; 3] = [
+        [1.0, -1.0, 0.0, 0.0],
+        [1.0, -2.0, 1.0, 0.0],
+        [1.0, -3.0, 3.0, -1.0],
+    ];
+
+    /// Segments along X with steps of position, velocity and acceleration between them, the first over three periods. The path
+    /// coordinate counts segments.
+    fn drawn(random: &mut Random) -> Vec<Segment> {
+        let mut at = [0.0; 3];
+        let segment = |n: usize| {
+            let periods = if n == 0 { 3.0 } else { random.length(0.1, 3.0) };
+            let mut segment = Segment::rest(&AxisVector::ZERO, periods * PERIOD_S);
+            let [position, speed, acceleration] = at;
+            let jerk = random.between(-JERK, JERK);
+            let changes = 1e7 * random.between(-1.0, 1.0);
+            let c = [
+                position,
+                speed,
+                acceleration / 2.0,
+                jerk / 6.0,
+                changes / 24.0,
+                0.0,
+            ];
+            segment.coefficients[0] = c;
+            segment.path = [n as f64, 1.0 / segment.duration_s, 0.0, 0.0, 0.0, 0.0];
+            at = state(&c, segment.duration_s);
+            for (at, most) in at.iter_mut().zip([4e-6, 1.5e-2, 10.0]) {
+                *at += most * random.between(-1.0, 1.0);
+            }
+            segment
+        };
+        (0..6).map(segment).collect()
+    }
+
+    /// Position along X and path coordinate `t_s` after the last segment begins.
+    fn at(segments: &[Segment], mut t_s: f64) -> (f64, f64) {
+        let mut n = segments.len() - 1;
+        while t_s < 0.0 {
+            n -= 1;
+            t_s += segments[n].duration_s;
+        }
+        let of = |c: &[f64; 6]| -> f64 { c.iter().rev().fold(0.0, |sum, c| sum * t_s + c) };
+        (of(&segments[n].coefficients[0]), of(&segments[n].path))
+    }
+
+    /// Times after the last segment begins: even ones, and those just beside the places where a sample enters a segment, which may
+    /// lie as near to each other as they like.
+    fn phases(segments: &[Segment]) -> Vec<f64> {
+        const EVEN: u32 = 500;
+        let end_s = segments[segments.len() - 1].duration_s;
+        let mut phases: Vec<f64> = (0..=EVEN)
+            .map(|n| end_s * f64::from(n) / f64::from(EVEN))
+            .collect();
+        let mut begins_s = 0.0;
+        for segment in segments.iter().rev().skip(1) {
+            for n in 0..=3 {
+                let enters_s = begins_s + f64::from(n) * PERIOD_S;
+                phases.extend([enters_s - 1e-9, enters_s + 1e-9]);
+            }
+            begins_s -= segment.duration_s;
+        }
+        phases.retain(|t_s| (0.0..=end_s).contains(t_s));
+        phases
+    }
+
+    /// What samples at many phases show is what is found, and where they show too much lies in the range that is told.
+    #[test]
+    fn differences_are_those_of_samples_at_any_phase() {
+        let mut random = Random::from_the_clock();
+        let mut limits = axis(5.0);
+        limits.jerk_mm_per_s3 = JERK;
+        limits.feed_mm_per_s = 0.01;
+        let most_apart = [
+            0.01 * PERIOD_S,
+            5.0 * PERIOD_S * PERIOD_S,
+            JERK * PERIOD_S * PERIOD_S * PERIOD_S,
+        ];
+        let bounds = Bounds {
+            context: context(&[limits], PERIOD_S),
+            chord_error_mm: 0.01,
+        };
+        let mut exceeded = 0;
+        for _ in 0..300 {
+            let segments = drawn(&mut random);
+            let mut trail = Trail::default();
+            trail.begin(segments.iter(), &bounds);
+            let found = trail.judge(&bounds);
+            let worst = [
+                found.worst.speed,
+                found.worst.acceleration,
+                found.worst.jerk,
+            ];
+            let mut most = [0.0_f64; 3];
+            for t_s in phases(&segments) {
+                let back = [0, 1, 2, 3].map(|n| at(&segments, t_s - f64::from(n) * PERIOD_S));
+                for (order, weights) in WEIGHTS.iter().enumerate() {
+                    let sum: f64 = weights.iter().zip(back).map(|(w, (x, _))| w * x).sum();
+                    let share = sum.abs() / most_apart[order];
+                    most[order] = most[order].max(share);
+                    if share > 1.0 + 1e-6 {
+                        let (from_mm, to_mm) = (back[order + 1].1, back[0].1);
+                        assert!(found.from_mm < from_mm + 1e-9 && found.to_mm > to_mm - 1e-9);
+                    }
+                }
+            }
+            for (worst, most) in worst.into_iter().zip(most) {
+                assert!(
+                    most < worst.max(1.0) + 1e-6,
+                    "{most} of samples, {worst} found"
+                );
+            }
+            assert!(worst[2] < (1.02 * most[2]).max(1.02), "{most:?}, {worst:?}");
+            exceeded += usize::from(most[2] > 1.0);
+        }
+        assert!((30..=270).contains(&exceeded), "{exceeded}");
+    }
+}
