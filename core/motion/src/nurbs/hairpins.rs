@@ -3,6 +3,8 @@
 //! There it nearly stands still in its parameter. By arc length that is a feature of its own size, however small: between it
 //! and the rest of the curve lie all derivatives up to those of a cusp.
 
+use tandem_sdk::AxisVector;
+
 use super::Nurbs;
 
 /// Places of a span at which its speed in the parameter is compared; polynomials have no more minima than their degree.
@@ -40,39 +42,26 @@ impl Nurbs {
         radius_mm: f64,
         found: &mut Vec<f64>,
     ) {
-        // Speed in the parameter, and half of how its square changes.
-        let look = |u: f64| {
-            let at = self.derivatives_in(span, u);
-            (
-                self.counted_length(&at.first),
-                self.counted_product(&at.first, &at.second),
-            )
-        };
         let places = self.looked_at(span, (from, to));
-        let fastest = places.iter().map(|u| look(*u).0).fold(0.0, f64::max);
+        let fastest = places.iter().map(|at| at.speed).fold(0.0, f64::max);
         for n in 1..places.len() {
-            let mut low = places[n - 1];
-            let mut high = places[n];
-            let ends = [low, high].map(look);
-            let falls_and_rises = ends[0].1 < 0.0 && ends[1].1 > 0.0;
-            if !falls_and_rises || ends[0].0.min(ends[1].0) > SLOW * fastest {
+            let [before, after] = [&places[n - 1], &places[n]];
+            let falls_and_rises = before.change < 0.0 && after.change > 0.0;
+            if !falls_and_rises || before.speed.min(after.speed) > SLOW * fastest {
                 continue;
             }
             // Where one of the places is the hairpin nearly itself, only the next one is behind it.
-            let wider = [
-                places[n.saturating_sub(2)],
-                places[(n + 1).min(places.len() - 1)],
-            ];
-            if [[low, high], wider]
-                .iter()
-                .all(|ends| !self.turns_between(span, *ends))
-            {
+            let last = places.len() - 1;
+            let wider = [&places[n.saturating_sub(2)], &places[(n + 1).min(last)]];
+            if !self.turns_between([before, after]) && !self.turns_between(wider) {
                 // It slows down and goes on the same way.
                 continue;
             }
+            let mut low = before.u;
+            let mut high = after.u;
             for _ in 0..HALVINGS {
                 let middle = f64::midpoint(low, high);
-                if look(middle).1 < 0.0 {
+                if self.look(span, middle).change < 0.0 {
                     low = middle;
                 } else {
                     high = middle;
@@ -95,31 +84,52 @@ impl Nurbs {
 
     /// Places of a part of a span at which its speed is compared: even ones, and where it stands still at an end ever nearer to that,
     /// but not the end itself. There speed and direction are rounding, and between it and the last of the even places it may turn.
-    fn looked_at(&self, span: usize, (from, to): (f64, f64)) -> Vec<f64> {
+    fn looked_at(&self, span: usize, (from, to): (f64, f64)) -> Vec<Look> {
         let way = to - from;
-        let speed = |u: f64| self.counted_length(&self.derivatives_in(span, u).first);
-        let mut places: Vec<f64> = (0..=LOOKS)
-            .map(|n| from + way * (f64::from(n) / f64::from(LOOKS)))
+        let look = |u: f64| self.look(span, u);
+        let mut places: Vec<Look> = (0..=LOOKS)
+            .map(|n| look(from + way * (f64::from(n) / f64::from(LOOKS))))
             .collect();
-        let fastest = places.iter().map(|u| speed(*u)).fold(0.0, f64::max);
+        let fastest = places.iter().map(|at| at.speed).fold(0.0, f64::max);
         let nearer = |end: f64, way: f64| {
             (1..=NEARER).map(move |n| end + way / (f64::from(LOOKS) * f64::from(1u32 << n)))
         };
-        if speed(to) <= STILL * fastest {
+        if look(to).speed <= STILL * fastest {
             places.pop();
-            places.extend(nearer(to, -way));
+            places.extend(nearer(to, -way).map(look));
         }
-        if speed(from) <= STILL * fastest {
+        if places[0].speed <= STILL * fastest {
             places.remove(0);
-            let mut first: Vec<f64> = nearer(from, way).collect();
+            let mut first: Vec<Look> = nearer(from, way).map(look).collect();
             first.reverse();
             places.splice(0..0, first);
         }
         places
     }
 
-    fn turns_between(&self, span: usize, ends: [f64; 2]) -> bool {
-        let ways = ends.map(|u| self.derivatives_in(span, u).first);
-        self.counted_product(&ways[0], &ways[1]) < 0.0
+    fn look(&self, span: usize, u: f64) -> Look {
+        let at = self.derivatives_in(span, u);
+        Look {
+            u,
+            first: at.first,
+            speed: self.counted_length(&at.first),
+            change: self.counted_product(&at.first, &at.second),
+        }
     }
+
+    fn turns_between(&self, [before, after]: [&Look; 2]) -> bool {
+        self.counted_product(&before.first, &after.first) < 0.0
+    }
+}
+
+/// A place of a span as the search for hairpins sees it.
+struct Look {
+    /// Its parameter.
+    u: f64,
+    /// Derivative by the parameter, mm.
+    first: AxisVector,
+    /// Speed in the parameter, mm.
+    speed: f64,
+    /// Half of how the square of the speed changes, mm².
+    change: f64,
 }
