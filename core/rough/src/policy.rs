@@ -168,6 +168,10 @@ impl<S: Source, P: BlockPolicy> Source for Tuned<S, P> {
         !self.items.is_empty() || self.source.may_go_on(driven)
     }
 
+    fn streams(&self) -> bool {
+        self.source.streams()
+    }
+
     fn period(&mut self) {
         self.source.period();
     }

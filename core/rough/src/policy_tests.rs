@@ -255,8 +255,12 @@ fn what_an_input_has_answered_reaches_the_program_behind_a_policy() {
 }
 
 #[test]
-fn a_source_behind_a_policy_counts_the_periods_for_which_it_waits() {
+fn a_source_behind_a_policy_streams_and_counts_the_periods_for_which_it_waits() {
     let mut source = Tuned::new(Waits::default(), Recorder::default());
+    assert!(
+        source.streams(),
+        "more may come in time: the end of what is there is no rest"
+    );
     assert!(!source.is_waiting());
     source.period();
     assert!(source.is_waiting());

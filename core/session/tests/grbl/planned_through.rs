@@ -5,7 +5,7 @@ use tandem_oracle::{Row, Trace};
 use tandem_rig::Random;
 
 use crate::speak::{
-    Streamer, alone_s, assert_as_long_as_a_run, chords, jobs, machine, serve_recorded,
+    Streamer, alone_s, assert_as_long_as_a_run, chords, jobs, machine, serve, serve_recorded,
 };
 
 /// Times at which the machine slows down to a tenth of its feed between the first and the last motion, s.
@@ -83,4 +83,33 @@ fn planned_through(example: &str) {
         "lines every {every} ms: it slows down at {slow_s:?} s"
     );
     assert_as_long_as_a_run(&jobs, alone_s, &format!("lines every {every} ms"));
+}
+
+/// A script sees a program from above, and a sender's lines have no above: they are driven as on a machine without it, in one go.
+#[test]
+fn a_policy_script_leaves_the_lines_of_a_sender_alone() {
+    let script = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../scripts/policies/material-feed.wasm"
+    );
+    let keys = [
+        ("policy.script", script),
+        ("policy.parameters.material", "1"),
+        ("policy.parameters.scale", "0.5"),
+    ];
+    let all = chords(2000);
+    let text: String = all.split_inclusive('\n').take(200).collect();
+    let with_script = machine("mill-3axis.toml", &keys);
+    let without_s = alone_s(&machine("mill-3axis.toml", &[]), &text);
+    let tuned_s = alone_s(&with_script, &text);
+    assert!(
+        tuned_s > 1.2 * without_s,
+        "the script slows the same lines of a file: {tuned_s} s for {without_s}"
+    );
+    let (streamer, seen) = Streamer::new(&text, 127, 200, 1);
+    let told = serve(&with_script, vec![streamer], vec![]);
+    assert_eq!(seen.lock().unwrap().errors, [""; 0]);
+    let jobs = jobs(&told);
+    assert_eq!(jobs.len(), 1, "{jobs:?}");
+    assert_as_long_as_a_run(&jobs, without_s, "with a policy script");
 }
