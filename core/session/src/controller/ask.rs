@@ -173,6 +173,7 @@ impl Dispatcher {
         self.upload.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Does or orders a request that was granted.
     fn act(
         &self,
         from: RequestId,
@@ -181,142 +182,44 @@ impl Dispatcher {
         program: Option<Loaded>,
         inner: &mut Inner,
     ) -> Result<Acted, String> {
-        let give = |command: Command| {
-            self.hub
-                .give(command)
-                .map(|tick| Acted::Done(json!({ "tick": tick })))
-        };
         match name {
             "status" => Ok(Acted::Done(self.status_of(inner))),
-            "history" => {
-                let count = asked.whole_if_any("count").unwrap_or(HELD as u64);
-                Ok(Acted::Done(inner.history.show(count as usize)))
-            }
+            "history" => Ok(Acted::Done(show_history(asked, inner))),
             "alarms" => Ok(Acted::Done(
                 json!({ "alarms": inner.history.open_alarms() }),
             )),
             "machine" => Ok(Acted::Done(described::machine(&self.machine))),
-            "tables" => {
-                let lasting = lock(&self.lines).standing().lasting();
-                Ok(Acted::Done(described::tables(&self.machine, &lasting)))
-            }
-            "path" => {
-                let number = |key: &str| asked.whole_if_any(key).unwrap_or(0);
-                let (from, driven_from) = (number("from"), number("driven_from"));
-                Ok(Acted::Done(if asked.is_on("packed") {
-                    self.path().show_packed(from, driven_from)
-                } else {
-                    self.path().show(from, driven_from)
-                }))
-            }
-            "text" => {
-                let number = |key: &str, usual| asked.whole_if_any(key).unwrap_or(usual);
-                let (first, count) = (number("from", 1), number("lines", u64::MAX));
-                let loaded = inner.loaded.as_ref();
-                Ok(Acted::Done(loaded.map_or_else(
-                    || json!({ "program": null, "lines": [], "count": 0 }),
-                    |program| program.show(first, count),
-                )))
-            }
+            "tables" => Ok(Acted::Done(self.show_tables())),
+            "path" => Ok(Acted::Done(self.show_path(asked))),
+            "text" => Ok(Acted::Done(show_text(asked, inner))),
             "scope" => self.scope().watch(from.client, asked).map(Acted::Done),
             "capture" => self.scope().arm(from.client, asked).map(Acted::Done),
-            "captured" => {
-                let first = asked.whole_if_any("from").unwrap_or(0) as usize;
-                self.scope().captured(from.client, first).map(Acted::Done)
-            }
+            "captured" => self.show_captured(from, asked).map(Acted::Done),
             "policy-parameters" => Ok(Acted::Done(
                 json!({ "parameters": inner.policy_parameters, "declared": inner.declared_parameters }),
             )),
-            "set-policy-parameter" => Ok(Acted::Ordered(Order::SetPolicyParameter {
-                from,
-                name: asked.text("name")?.to_string(),
-                value: asked.number("value")?,
-            })),
-            "hold" => give(Command::Hold),
-            "resume" => give(Command::Resume),
-            "emergency-stop" => {
-                inner.stops += 1;
-                inner.emergency_stops += 1;
-                give(Command::EmergencyStop)
-            }
-            "abort" => {
-                let done = if inner.is_about_to_move() {
-                    Acted::Done(json!({ "tick": self.hub.now() }))
-                } else {
-                    give(Command::Abort)?
-                };
-                inner.aborting = true;
-                inner.stops += 1;
-                self.jogs.forget();
-                Ok(done)
-            }
-            "feed-override" => asked
-                .number("ratio")
-                .and_then(ratio)
-                .and_then(|r| give(Command::FeedOverride(r))),
-            "rapid-override" => asked
-                .number("ratio")
-                .and_then(ratio)
-                .and_then(|r| give(Command::RapidOverride(r))),
-            "single-block" => give(Command::SingleBlock(asked.on()?)),
-            "optional-stop" => give(Command::OptionalStop(asked.on()?)),
+            "set-policy-parameter" => set_policy_parameter(from, asked).map(Acted::Ordered),
+            "hold" => self.give(Command::Hold),
+            "resume" => self.give(Command::Resume),
+            "emergency-stop" => self.stop_in_emergency(inner),
+            "abort" => self.abort(inner),
+            "feed-override" => self.give(Command::FeedOverride(ratio(asked)?)),
+            "rapid-override" => self.give(Command::RapidOverride(ratio(asked)?)),
+            "single-block" => self.give(Command::SingleBlock(asked.on()?)),
+            "optional-stop" => self.give(Command::OptionalStop(asked.on()?)),
             "block-delete" => {
                 inner.block_delete = asked.on()?;
                 Ok(Acted::Done(json!({ "block_delete": inner.block_delete })))
             }
-            "load" | "check" => {
-                let program = program.ok_or("the program was not read")?;
-                Ok(Acted::Ordered(Order::Check {
-                    from,
-                    program,
-                    load: name == "load",
-                }))
-            }
-            "start" => {
-                let missing = "no program is loaded: \"load\" loads one";
-                inner
-                    .loaded
-                    .as_ref()
-                    .map(|_| Acted::Ordered(Order::Start { from }))
-                    .ok_or_else(|| missing.to_string())
-            }
-            "mdi" => {
-                let taken = lock(&self.lines)
-                    .judge(from.client, from.id, asked.text("line")?)
-                    .map_err(|why| why.to_string())?;
-                let judged = json!({ "judged": true });
-                Ok(if Self::begins_lines(inner, taken) {
-                    Acted::Begins(Order::Mdi, judged)
-                } else {
-                    Acted::Done(judged)
-                })
-            }
+            "load" | "check" => check(from, program, name == "load").map(Acted::Ordered),
+            "start" => start(from, inner).map(Acted::Ordered),
+            "mdi" => self.manual_line(from, asked, inner),
             "jog-stop" => {
                 self.jogs.let_go();
                 Ok(Acted::Done(json!({ "jog": "stop" })))
             }
-            "jog" => {
-                let jog = jog(asked)?.on(&self.machine.axes)?;
-                if asked.is_on("again") {
-                    self.jogs.keep_alive(jog)?;
-                    return Ok(Acted::Done(json!({ "jog": asked.with.get("axis") })));
-                }
-                self.jogs.ask(jog)?;
-                let done = json!({ "jog": asked.with.get("axis") });
-                let waits = inner.mode == Mode::Jog || inner.order.is_some();
-                Ok(if waits {
-                    Acted::Done(done)
-                } else {
-                    Acted::Begins(Order::Jog, done)
-                })
-            }
-            "home" => {
-                let axis = asked.text_if_any("axis").map(|axis| self.axis(axis));
-                Ok(Acted::Ordered(Order::Home {
-                    from,
-                    axis: axis.transpose()?,
-                }))
-            }
+            "jog" => self.jog(asked, inner),
+            "home" => self.home(from, asked).map(Acted::Ordered),
             "reset" | "enable" => Ok(Acted::Ordered(Order::Enable {
                 from,
                 resets: name == "reset",
@@ -325,6 +228,88 @@ impl Dispatcher {
             "disable" => Ok(Acted::Ordered(Order::Disable { from })),
             other => Err(format!("{other} is not done here")),
         }
+    }
+
+    /// Gives the fine loop a command; the answer is the tick at which it came.
+    fn give(&self, command: Command) -> Result<Acted, String> {
+        let tick = self.hub.give(command)?;
+        Ok(Acted::Done(json!({ "tick": tick })))
+    }
+
+    fn show_tables(&self) -> Value {
+        let lasting = lock(&self.lines).standing().lasting();
+        described::tables(&self.machine, &lasting)
+    }
+
+    fn show_path(&self, asked: &Asked) -> Value {
+        let number = |key: &str| asked.whole_if_any(key).unwrap_or(0);
+        let from = number("from");
+        let driven_from = number("driven_from");
+        if asked.is_on("packed") {
+            self.path().show_packed(from, driven_from)
+        } else {
+            self.path().show(from, driven_from)
+        }
+    }
+
+    fn show_captured(&self, from: RequestId, asked: &Asked) -> Result<Value, String> {
+        let first = asked.whole_if_any("from").unwrap_or(0) as usize;
+        self.scope().captured(from.client, first)
+    }
+
+    fn stop_in_emergency(&self, inner: &mut Inner) -> Result<Acted, String> {
+        inner.stops += 1;
+        inner.emergency_stops += 1;
+        self.give(Command::EmergencyStop)
+    }
+
+    fn abort(&self, inner: &mut Inner) -> Result<Acted, String> {
+        let done = if inner.is_about_to_move() {
+            Acted::Done(json!({ "tick": self.hub.now() }))
+        } else {
+            self.give(Command::Abort)?
+        };
+        inner.aborting = true;
+        inner.stops += 1;
+        self.jogs.forget();
+        Ok(done)
+    }
+
+    /// Judges a line that waits for no disk, and takes it.
+    fn manual_line(&self, from: RequestId, asked: &Asked, inner: &Inner) -> Result<Acted, String> {
+        let taken = lock(&self.lines)
+            .judge(from.client, from.id, asked.text("line")?)
+            .map_err(|why| why.to_string())?;
+        let judged = json!({ "judged": true });
+        Ok(if Self::begins_lines(inner, taken) {
+            Acted::Begins(Order::Mdi, judged)
+        } else {
+            Acted::Done(judged)
+        })
+    }
+
+    fn jog(&self, asked: &Asked, inner: &Inner) -> Result<Acted, String> {
+        let jog = jog_of(asked)?.on(&self.machine.axes)?;
+        let done = json!({ "jog": asked.with.get("axis") });
+        if asked.is_on("again") {
+            self.jogs.keep_alive(jog)?;
+            return Ok(Acted::Done(done));
+        }
+        self.jogs.ask(jog)?;
+        let waits = inner.mode == Mode::Jog || inner.order.is_some();
+        Ok(if waits {
+            Acted::Done(done)
+        } else {
+            Acted::Begins(Order::Jog, done)
+        })
+    }
+
+    fn home(&self, from: RequestId, asked: &Asked) -> Result<Order, String> {
+        let axis = asked.text_if_any("axis").map(|axis| self.axis(axis));
+        Ok(Order::Home {
+            from,
+            axis: axis.transpose()?,
+        })
     }
 
     fn axis(&self, letter: &str) -> Result<usize, String> {
@@ -381,7 +366,47 @@ fn begins_or_sets(name: &str) -> bool {
     .contains(&name)
 }
 
-fn ratio(value: f64) -> Result<f64, String> {
+fn show_history(asked: &Asked, inner: &Inner) -> Value {
+    let count = asked.whole_if_any("count").unwrap_or(HELD as u64);
+    inner.history.show(count as usize)
+}
+
+/// Lines of the program that is loaded.
+fn show_text(asked: &Asked, inner: &Inner) -> Value {
+    let first = asked.whole_if_any("from").unwrap_or(1);
+    let count = asked.whole_if_any("lines").unwrap_or(u64::MAX);
+    inner.loaded.as_ref().map_or_else(
+        || json!({ "program": null, "lines": [], "count": 0 }),
+        |program| program.show(first, count),
+    )
+}
+
+fn set_policy_parameter(from: RequestId, asked: &Asked) -> Result<Order, String> {
+    Ok(Order::SetPolicyParameter {
+        from,
+        name: asked.text("name")?.to_string(),
+        value: asked.number("value")?,
+    })
+}
+
+fn check(from: RequestId, program: Option<Loaded>, load: bool) -> Result<Order, String> {
+    Ok(Order::Check {
+        from,
+        program: program.ok_or("the program was not read")?,
+        load,
+    })
+}
+
+fn start(from: RequestId, inner: &Inner) -> Result<Order, String> {
+    if inner.loaded.is_none() {
+        return Err("no program is loaded: \"load\" loads one".to_string());
+    }
+    Ok(Order::Start { from })
+}
+
+/// The ratio that an override is set to.
+fn ratio(asked: &Asked) -> Result<f64, String> {
+    let value = asked.number("ratio")?;
     if value.is_finite() && value >= 0.0 {
         Ok(value)
     } else {
@@ -390,7 +415,7 @@ fn ratio(value: f64) -> Result<f64, String> {
 }
 
 /// A jog as clients ask for it.
-fn jog(asked: &Asked) -> Result<JogMessage, String> {
+fn jog_of(asked: &Asked) -> Result<JogMessage, String> {
     let axis = asked
         .text("axis")?
         .chars()

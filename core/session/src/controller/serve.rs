@@ -1,8 +1,8 @@
 //! The loop that drives: orders of the dispatcher become jobs, one after the other.
 
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
+use std::sync::{Arc, Mutex};
 
 use serde_json::{Value, json};
 use tandem_gcode::{Interpreter, Lasting, Program};
@@ -90,61 +90,27 @@ impl<'r> Controller<'r> {
         options: Options,
         persistence: Box<dyn Persistence>,
     ) -> Result<Self, HostError> {
-        let system = |why: String| HostError::System(why);
         let simulated = !moves_metal(machine, registry);
         let mut resident = Resident::attach(machine.clone(), registry, options.clock)?;
         resident.begin_at(options.uptime_periods);
         let machine = resident.machine().clone();
-        let mut config = interpreter_config(&machine, simulated, Switches::default());
-        if let Some(lasting) = options.lasting {
-            config.tools.clone_from(&lasting.tools);
-            config.lasting = Some(Arc::new(lasting));
-        }
-        let lines = Lines::new(
-            &machine,
-            [planner(&machine, registry)?, planner(&machine, registry)?],
-            Interpreter::new(config),
-        );
-        let mut jogged = machine.clone();
-        jogged.limits = axis_limits(&machine, registry)?;
-        let jogs = Arc::new(JogController::new(&jogged, planner(&machine, registry)?));
-        let controls = Arc::clone(resident.controls());
-        let status = Arc::clone(resident.status());
-        let hub = Arc::new(OperatorHub::new(&machine, controls, Arc::clone(&status)));
-        let lines = Arc::new(std::sync::Mutex::new(lines));
-        let unknown = not_homed(&machine, resident.unknown_axes());
-        let keepsakes = persistence.remembered().policy_parameters;
-        let mut dispatcher = Dispatcher::new(
-            &machine,
-            hub,
-            status,
-            lines,
-            jogs,
+        let interpreter = interpreter_of(&machine, simulated, options.lasting);
+        let mut dispatcher = dispatcher_of(
+            &resident,
+            registry,
+            interpreter,
             persistence,
             options.programs,
-            unknown,
-        )
-        .map_err(system)?;
-        dispatcher.has_bus = resident.has_bus();
+        )?;
         let arrivals = options.arrivals.as_deref();
         let arrivals = arrivals.map(|path| Arrivals::create(path, machine.fine_period_s));
-        dispatcher.arrivals = arrivals.transpose().map_err(system)?;
+        dispatcher.arrivals = arrivals.transpose().map_err(HostError::System)?;
         let dispatcher = Arc::new(dispatcher);
         if options.clock == Clock::Virtual {
             dispatcher.set_replay_time(0.0);
         }
-        for (name, value) in keepsakes {
-            // A script that has changed knows it no longer: then the machine file counts, and somebody is told.
-            if let Err(why) = resident.set_policy_parameter(&name, value) {
-                dispatcher.raise(
-                    "policy-parameter",
-                    &format!("{name} = {value} of the state: {why}"),
-                );
-            }
-        }
-        dispatcher.lock().policy_parameters = resident.policy_parameters();
-        dispatcher.lock().declared_parameters = declared(resident.declared_parameters()?);
-        dispatcher.stands(&machine.start, unknown);
+        restore_policy_parameters(&mut resident, &dispatcher)?;
+        dispatcher.stands(&machine.start, not_homed(&machine, resident.unknown_axes()));
         if options.enable {
             dispatcher.lock().order = Some(Order::Enable {
                 from: RequestId { client: 0, id: 0 },
@@ -152,15 +118,7 @@ impl<'r> Controller<'r> {
                 emergency_stops: 0,
             });
         }
-        let server = if options.listen.is_nowhere() {
-            None
-        } else {
-            let service = ControllerService {
-                dispatcher: Arc::clone(&dispatcher),
-                settings: Arc::default(),
-            };
-            Some(Server::of(Arc::new(service), &options.listen).map_err(system)?)
-        };
+        let server = server_of(&dispatcher, &options.listen)?;
         let script = Script::new(options.script);
         let records = options.record.map(|root| {
             let dispatcher = Arc::clone(&dispatcher);
@@ -563,6 +521,80 @@ impl<'r> Controller<'r> {
     pub fn is_simulated(&self) -> bool {
         self.simulated
     }
+}
+
+/// The interpreter of lines by hand, with what has lasted from the process before.
+fn interpreter_of(machine: &Machine, simulated: bool, lasting: Option<Lasting>) -> Interpreter {
+    let mut config = interpreter_config(machine, simulated, Switches::default());
+    if let Some(lasting) = lasting {
+        config.tools.clone_from(&lasting.tools);
+        config.lasting = Some(Arc::new(lasting));
+    }
+    Interpreter::new(config)
+}
+
+/// The dispatcher for the drives of `resident`. Lines by hand are judged and planned by planners of their own, and so are jogs.
+fn dispatcher_of(
+    resident: &Resident<'_>,
+    registry: &Registry,
+    interpreter: Interpreter,
+    persistence: Box<dyn Persistence>,
+    programs: Option<PathBuf>,
+) -> Result<Dispatcher, HostError> {
+    let machine = resident.machine();
+    let planners = [planner(machine, registry)?, planner(machine, registry)?];
+    let lines = Arc::new(Mutex::new(Lines::new(machine, planners, interpreter)));
+    let mut jogged = machine.clone();
+    jogged.limits = axis_limits(machine, registry)?;
+    let jogs = Arc::new(JogController::new(&jogged, planner(machine, registry)?));
+    let controls = Arc::clone(resident.controls());
+    let status = Arc::clone(resident.status());
+    let hub = Arc::new(OperatorHub::new(machine, controls, Arc::clone(&status)));
+    let mut dispatcher = Dispatcher::new(
+        machine,
+        hub,
+        status,
+        lines,
+        jogs,
+        persistence,
+        programs,
+        not_homed(machine, resident.unknown_axes()),
+    )
+    .map_err(HostError::System)?;
+    dispatcher.has_bus = resident.has_bus();
+    Ok(dispatcher)
+}
+
+/// The policy script has the parameters of the process before, and clients are told what it declares. A script that has changed may
+/// know one no longer: then the machine file counts, and somebody is told.
+fn restore_policy_parameters(
+    resident: &mut Resident<'_>,
+    dispatcher: &Dispatcher,
+) -> Result<(), HostError> {
+    for (name, value) in dispatcher.persistence.remembered().policy_parameters {
+        if let Err(why) = resident.set_policy_parameter(&name, value) {
+            dispatcher.raise(
+                "policy-parameter",
+                &format!("{name} = {value} of the state: {why}"),
+            );
+        }
+    }
+    dispatcher.lock().policy_parameters = resident.policy_parameters();
+    dispatcher.lock().declared_parameters = declared(resident.declared_parameters()?);
+    Ok(())
+}
+
+/// The doors for clients, where there are any.
+fn server_of(dispatcher: &Arc<Dispatcher>, listen: &Listen) -> Result<Option<Server>, HostError> {
+    if listen.is_nowhere() {
+        return Ok(None);
+    }
+    let service = ControllerService {
+        dispatcher: Arc::clone(dispatcher),
+        settings: Arc::default(),
+    };
+    let server = Server::of(Arc::new(service), listen).map_err(HostError::System)?;
+    Ok(Some(server))
 }
 
 /// Parameters of the policy script as clients are told them.
