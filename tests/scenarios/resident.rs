@@ -72,11 +72,12 @@ fn serve(machine: &Path, program: &Path, folder: &Path) -> (Output, PathBuf) {
 fn commands(trace: &Path) -> Vec<String> {
     let text = std::fs::read_to_string(trace).unwrap();
     let head: Vec<&str> = text.lines().next().unwrap().split(',').collect();
-    let read_back = |at: usize| head[at].contains("_fb_") || head[at].starts_with("sig_");
+    let read_back = |name: &&str| name.contains("_fb_") || name.starts_with("sig_");
+    let kept: Vec<bool> = head.iter().map(|name| !read_back(name)).collect();
     let row = |line: &str| {
-        let cells = line.split(',').enumerate();
-        let kept = cells.filter(|(at, _)| !read_back(*at));
-        kept.map(|(_, cell)| cell).collect::<Vec<_>>().join(",")
+        let cells = line.split(',').zip(&kept);
+        let kept = cells.filter(|(_, kept)| **kept);
+        kept.map(|(cell, _)| cell).collect::<Vec<_>>().join(",")
     };
     text.lines().map(row).collect()
 }

@@ -144,6 +144,10 @@ fn from_line(block: &Block, place: &AxisVector) -> f64 {
     norm(&(offset - way * share))
 }
 
+/// A place that is so near to the helix at its own angle is on it, mm: no nearer one is looked for, which would take the distances of
+/// a hundred and fifty. Planners are held to two thousand times as much, and rounding moves a place by a hundredth of it.
+const ON_HELIX_MM: f64 = 1e-9;
+
 fn from_arc(block: &Block, place: &AxisVector) -> f64 {
     let arc = &block.arc;
     let (x, y) = (place[0] - arc.center_mm[0], place[1] - arc.center_mm[1]);
@@ -157,10 +161,11 @@ fn from_arc(block: &Block, place: &AxisVector) -> f64 {
         let across = (x - arc.radius_mm * cos).hypot(y - arc.radius_mm * sin);
         across.hypot(place[2] - block.start[2] - share * rise_mm)
     };
-    if rise_mm == 0.0 {
-        distance(share)
+    let beside_mm = distance(share);
+    if rise_mm == 0.0 || beside_mm <= ON_HELIX_MM {
+        beside_mm
     } else {
-        distance(share).min(least(distance))
+        beside_mm.min(least(distance))
     }
 }
 
@@ -168,9 +173,9 @@ fn from_arc(block: &Block, place: &AxisVector) -> f64 {
 fn least(of: impl Fn(f64) -> f64) -> f64 {
     const PLACES: u32 = 64;
     let at = |place: u32| f64::from(place) / f64::from(PLACES);
-    let best = (0..=PLACES)
-        .min_by(|a, b| of(at(*a)).total_cmp(&of(at(*b))))
-        .unwrap_or(0);
+    let values = (0..=PLACES).map(|place| (place, of(at(place))));
+    let best = values.min_by(|(_, a), (_, b)| a.total_cmp(b));
+    let best = best.map_or(0, |(place, _)| place);
     let (mut from, mut to) = (at(best.saturating_sub(1)), at((best + 1).min(PLACES)));
     for _ in 0..40 {
         let (low, high) = (from + (to - from) / 3.0, to - (to - from) / 3.0);

@@ -430,7 +430,7 @@ fn the_wrong_order_and_failures_are_faults() {
     }
 }
 
-fn check(mischief: &Mischief) -> (Option<i32>, String) {
+fn check(mischief: &Mischief, programs: &str) -> (Option<i32>, String) {
     let library: PathBuf = third_party("hostile");
     let settings = mischief.settings(&library);
     let options = settings
@@ -440,7 +440,7 @@ fn check(mischief: &Mischief) -> (Option<i32>, String) {
         .flat_map(|(key, value)| ["--set".into(), format!("{key}={value}")])
         .collect();
     let output = Command::new(env!("CARGO_BIN_EXE_tandem"))
-        .args(["plugin", "check", "--programs", "3"])
+        .args(["plugin", "check", "--programs", programs])
         .arg(&library)
         .args(options)
         .output()
@@ -451,9 +451,12 @@ fn check(mischief: &Mischief) -> (Option<i32>, String) {
     )
 }
 
+/// What is done in the first calls is found in the first program.
+const ONE_PROGRAM: &str = "1";
+
 #[test]
 fn the_conformance_kit_finds_it_out() {
-    let (status, out) = check(&Mischief::of("any", "never", "", 1));
+    let (status, out) = check(&Mischief::of("any", "never", "", 1), "3");
     assert_eq!(status, Some(0), "{out}");
     let by_kind = [
         (
@@ -490,7 +493,7 @@ fn the_conformance_kit_finds_it_out() {
         .flat_map(|(kind, methods)| methods.iter().map(move |method| (kind, method)))
     {
         let mischief = Mischief::of("any", "panic", method, 1);
-        let (status, out) = check(&mischief);
+        let (status, out) = check(&mischief, ONE_PROGRAM);
         let words = format!("panicked in {method}");
         assert!(
             status == Some(1) && out.contains(&words),
@@ -518,7 +521,7 @@ fn the_conformance_kit_finds_it_out() {
             method,
             if method.ends_with("stop") { 1 } else { 7 },
         );
-        let (status, out) = check(&mischief);
+        let (status, out) = check(&mischief, ONE_PROGRAM);
         assert!(
             status == Some(1) && out.contains(words),
             "{mischief}: {status:?}\n{out}"
