@@ -45,7 +45,7 @@ pub fn serve(options: &args::Serve) -> Result<u8, Box<dyn Error>> {
     let has_page = false;
     options.operator.check_tokens(has_page)?;
     let store = store(options, &machine, replays)?;
-    let lasting = store
+    let persistent = store
         .as_ref()
         .map(|store| store.load().to_program(&machine.home));
     let kept_in = store.as_ref().map(|store| store.path().to_owned());
@@ -63,7 +63,7 @@ pub fn serve(options: &args::Serve) -> Result<u8, Box<dyn Error>> {
         enable: !options.disabled && (options.enable || simulated),
         script,
         uptime_periods: options.uptime_periods,
-        lasting,
+        persistent,
     };
     let enabled = asked.enable;
     let controller = Controller::open(&machine, &registry, asked, persistence)?;

@@ -18,7 +18,7 @@ use crate::batch::{plugins, programs, show, stop_at_signals, threads};
 use crate::{FAULT, REFUSED, args};
 
 /// What the drawing needs besides what was found.
-pub struct Made<'a> {
+pub struct TuneRun<'a> {
     pub options: &'a args::Tune,
     pub machine: &'a Machine,
     pub task: &'a Task,
@@ -88,7 +88,7 @@ pub fn tune(options: &args::Tune) -> Result<u8, Box<dyn Error>> {
         .iter()
         .map(|(path, _)| path.display().to_string())
         .collect();
-    let made = Made {
+    let run = TuneRun {
         options,
         machine: &machine,
         task: &task,
@@ -97,15 +97,15 @@ pub fn tune(options: &args::Tune) -> Result<u8, Box<dyn Error>> {
         plugins: &plugins,
         programs: names,
     };
-    print(&made, chosen);
+    print(&run, chosen);
     let report = options
         .report
         .clone()
         .unwrap_or_else(|| folder.file("report.html"));
-    drawing::write(&report, &made, chosen)?;
+    drawing::write(&report, &run, chosen)?;
     let _ = writeln!(stdout(), "report: {}", report.display());
     if let Some(path) = &options.apply {
-        apply(path, &made, &tuned.points[chosen])?;
+        apply(path, &run, &tuned.points[chosen])?;
         let _ = writeln!(stdout(), "settings: {}", path.display());
     }
     Ok(if tuned.points[chosen].is_kept() {
@@ -209,8 +209,8 @@ pub fn label(key: &str) -> (String, f64) {
 }
 
 /// The first sentence of what came out.
-pub fn verdict(made: &Made<'_>, chosen: usize) -> String {
-    let (task, points) = (made.task, &made.tuned.points);
+pub fn verdict(run: &TuneRun<'_>, chosen: usize) -> String {
+    let (task, points) = (run.task, &run.tuned.points);
     let (best, as_it_is) = (&points[chosen], &points[0]);
     let name = |key: &str| {
         label(key)
@@ -251,15 +251,15 @@ pub fn verdict(made: &Made<'_>, chosen: usize) -> String {
     text
 }
 
-fn print(made: &Made<'_>, chosen: usize) {
-    let (task, tuned) = (made.task, made.tuned);
-    let count = made.programs.len();
+fn print(run: &TuneRun<'_>, chosen: usize) {
+    let (task, tuned) = (run.task, run.tuned);
+    let count = run.programs.len();
     let mut text = format!(
         "{} settings of {} on {count} program{}\n{}\n",
         tuned.points.len(),
-        made.machine.name,
+        run.machine.name,
         if count == 1 { "" } else { "s" },
-        verdict(made, chosen)
+        verdict(run, chosen)
     );
     for (key, value) in set_of(&task.parameters, tuned.points[chosen].values.as_ref()) {
         let _ = writeln!(text, "  {key} = {}", toml_value(&value));
@@ -282,13 +282,13 @@ fn toml_value(text: &str) -> String {
 }
 
 /// Writes the chosen settings as a machine file that includes the one they are for.
-fn apply(path: &Path, made: &Made<'_>, chosen: &Tried) -> Result<(), Box<dyn Error>> {
-    let machine = std::path::absolute(&made.options.machine.path)?;
+fn apply(path: &Path, run: &TuneRun<'_>, chosen: &Tried) -> Result<(), Box<dyn Error>> {
+    let machine = std::path::absolute(&run.options.machine.path)?;
     let include = toml::Value::String(machine.display().to_string());
     let mut text = format!("format = 1\ninclude = [{include}]\n");
-    let set = set_of(&made.task.parameters, chosen.values.as_ref());
+    let set = set_of(&run.task.parameters, chosen.values.as_ref());
     let mut tables: Vec<(String, Vec<String>)> = vec![];
-    for (key, value) in made.options.machine.overrides.iter().chain(&set) {
+    for (key, value) in run.options.machine.overrides.iter().chain(&set) {
         let (table, name) = key.rsplit_once('.').unwrap_or(("", key));
         let line = format!("{name} = {}", toml_value(value));
         if !tables.iter().any(|(one, _)| one == table) {

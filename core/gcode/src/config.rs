@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use tandem_sdk::{Axes, AxisVector, MAX_AXES};
 
-use crate::lasting::{Lasting, SwitchedOn};
+use crate::persistent::{PersistentData, SwitchedOn};
 use crate::stated::Watched;
 
 /// One row of the tool table.
@@ -121,7 +121,7 @@ pub struct Config {
     pub watched: Vec<Watched>,
     /// What has lasted from the programs before; its tool table is to be that of `tools`. None where a program begins with
     /// nothing but this machine.
-    pub lasting: Option<Arc<Lasting>>,
+    pub persistent: Option<Arc<PersistentData>>,
     /// Spindle and coolant as they are when the program begins.
     pub on: SwitchedOn,
 }
@@ -158,7 +158,7 @@ impl Config {
             subroutine_path: Vec::new(),
             max_steps: DEFAULT_MAX_STEPS,
             watched: Vec::new(),
-            lasting: None,
+            persistent: None,
             on: SwitchedOn::default(),
         }
     }

@@ -9,9 +9,9 @@ use crate::config::Config;
 use crate::diagnostic::{Diagnostic, Severity};
 use crate::flow::{by_hand, o_word};
 use crate::item::{Item, ProbeResult};
-use crate::lasting::SwitchedOn;
 use crate::line::Line;
 use crate::line_error::{Checked, LineError, Span};
+use crate::persistent::SwitchedOn;
 use crate::state::State;
 use crate::state::letters::Letters;
 use crate::state::parameters::{Parameters, Value};
@@ -79,17 +79,17 @@ pub struct Interpreter {
 impl Interpreter {
     /// An interpreter at the start of a program on the machine `config`.
     pub fn new(config: Config) -> Self {
-        let lasting = config.lasting.clone();
+        let persistent = config.persistent.clone();
         let on = config.on;
-        let mut new = Self::without_lasting(config);
+        let mut new = Self::without_persistent_data(config);
         (new.state.spindle, new.state.coolant) = (on.spindle, on.coolant);
-        if let Some(lasting) = lasting {
-            new.set_lasting(&lasting);
+        if let Some(persistent) = persistent {
+            new.set_persistent_data(&persistent);
         }
         new
     }
 
-    fn without_lasting(config: Config) -> Self {
+    fn without_persistent_data(config: Config) -> Self {
         Self {
             letters: Letters::new(&config.axes),
             state: State::new(&config),

@@ -46,9 +46,9 @@ mod diagnostic;
 mod flow;
 mod interpreter;
 mod item;
-mod lasting;
 mod line;
 mod line_error;
+mod persistent;
 mod program;
 mod state;
 mod stated;
@@ -67,8 +67,10 @@ pub use config::{
 pub use diagnostic::{Diagnostic, Severity};
 pub use interpreter::{Interpreter, MAX_LINE_BYTES};
 pub use item::{Input, InputMode, InputWait, Item, ProbeResult, UserCommand};
-pub use lasting::{InForce, Lasting, Ledger, Moment, SwitchedOn, WORK_SYSTEMS, system_code};
 pub use line_error::Sketch;
+pub use persistent::{
+    InForce, PersistentData, StateTag, StateTags, SwitchedOn, WORK_SYSTEMS, system_code,
+};
 pub use program::{Program, ProgramError};
 pub use stated::Watched;
 pub use stream::Stream;

@@ -7,7 +7,7 @@ use tandem_sdk::AxisVector;
 use crate::config::Config;
 use crate::flow::{Execution, Step};
 use crate::item::{Item, ProbeResult};
-use crate::lasting::{Ledger, Moment};
+use crate::persistent::{StateTag, StateTags};
 use crate::program::lines::Pass;
 use crate::program::{Program, ProgramError};
 
@@ -18,8 +18,8 @@ pub struct Stream {
     execution: Execution,
     waiting: Option<Waiting>,
     /// Who is told what lines change, and how things were behind the last line that was told.
-    ledger: Option<Ledger>,
-    told: Option<Moment>,
+    state_tags: Option<StateTags>,
+    told: Option<StateTag>,
 }
 
 /// What must be provided before the next item.
@@ -43,21 +43,23 @@ impl Stream {
             program,
             execution,
             waiting: None,
-            ledger: None,
+            state_tags: None,
             told: None,
         })
     }
 
-    /// Tells `ledger` what every line changes, with the block at which the path reaches it. Before the first item.
-    pub fn tell(&mut self, ledger: Ledger) {
-        self.execution.interpreter.keep_moments();
-        self.ledger = Some(ledger);
+    /// Tells `state_tags` what every line changes, with the block at which the path reaches it. Before the first item.
+    pub fn tell(&mut self, state_tags: StateTags) {
+        self.execution.interpreter.keep_state_tags();
+        self.state_tags = Some(state_tags);
     }
 
     fn tell_of_line(&mut self, first_block: u64) {
-        let Some(ledger) = &self.ledger else { return };
-        if let Some(moment) = self.execution.interpreter.moment_since(&mut self.told) {
-            ledger.push(first_block, moment);
+        let Some(state_tags) = &self.state_tags else {
+            return;
+        };
+        if let Some(tag) = self.execution.interpreter.state_tag_since(&mut self.told) {
+            state_tags.push(first_block, tag);
         }
     }
 

@@ -50,7 +50,7 @@ pub use planner::{
     Accepted, Advanced, BlockReport, LimitedBy, Planner, PlannerContext, PlannerDescription,
     SegmentSink,
 };
-pub use plugin::{Made, Plugin, PluginKind};
+pub use plugin::{Plugin, PluginKind, PluginResult};
 pub use segment::{Edge, Segment, SegmentFlags, StopOn, derivatives, polynomial};
 pub use slice::Slice;
 pub use strategy::{

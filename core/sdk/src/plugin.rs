@@ -9,7 +9,7 @@ use crate::{
 };
 
 /// What a constructor gives: the plugin, or why it refuses to start.
-pub type Made<T> = Result<Box<T>, PluginError>;
+pub type PluginResult<T> = Result<Box<T>, PluginError>;
 
 /// The kinds of plugins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -95,7 +95,7 @@ impl Plugin {
     ///
     /// # Errors
     /// It is of another kind, or refuses.
-    pub fn planner(&self, options: &str, context: &PlannerContext) -> Made<dyn Planner> {
+    pub fn planner(&self, options: &str, context: &PlannerContext) -> PluginResult<dyn Planner> {
         abi::open_planner(
             self.table(PluginKind::Planner)?,
             self.name(),
@@ -112,7 +112,7 @@ impl Plugin {
         &self,
         options: &str,
         context: &StrategyContext,
-    ) -> Made<dyn FeedStrategy> {
+    ) -> PluginResult<dyn FeedStrategy> {
         abi::open_strategy(
             self.table(PluginKind::FeedStrategy)?,
             self.name(),
@@ -125,7 +125,7 @@ impl Plugin {
     ///
     /// # Errors
     /// It is of another kind, or refuses.
-    pub fn driver(&self, options: &str) -> Made<dyn Driver> {
+    pub fn driver(&self, options: &str) -> PluginResult<dyn Driver> {
         abi::open_driver(self.table(PluginKind::Driver)?, self.name(), options)
     }
 
@@ -133,7 +133,11 @@ impl Plugin {
     ///
     /// # Errors
     /// It is of another kind, or refuses.
-    pub fn kinematics(&self, options: &str, context: &KinematicsContext) -> Made<dyn Kinematics> {
+    pub fn kinematics(
+        &self,
+        options: &str,
+        context: &KinematicsContext,
+    ) -> PluginResult<dyn Kinematics> {
         abi::open_kinematics(
             self.table(PluginKind::Kinematics)?,
             self.name(),

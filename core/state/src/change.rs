@@ -2,18 +2,18 @@
 
 use std::sync::Arc;
 
-use tandem_gcode::Lasting;
+use tandem_gcode::PersistentData;
 use tandem_sdk::AxisVector;
 
-use crate::data::{Alarm, Job, JobEnd, LastingState, Tool, ToolLife};
+use crate::data::{Alarm, Job, JobEnd, PersistentState, Tool, ToolLife};
 
 /// One change of what lasts. Each says the whole new value of what it names, so that of two of a kind only the later counts.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Change {
     /// What programs see is so: what differs from the file is written. Of parameters those that last are
-    /// ([`LastingState::keeps`]). A tool whose offset or diameter differs has been measured anew ([`Tool::measure`]); one that is
+    /// ([`PersistentState::keeps`]). A tool whose offset or diameter differs has been measured anew ([`Tool::measure`]); one that is
     /// missing stays. The tool length in force does not last.
-    Program(Arc<Lasting>),
+    Program(Arc<PersistentData>),
     /// The place of G28 (0) or G30 (1) is that of the machine file again.
     ForgetReference(usize),
     /// The value of parameter `number`, which lasts from now on.
@@ -70,5 +70,5 @@ pub enum Change {
     },
     /// Everything but the history is replaced: the initial values of a new file, and what was imported. Alarms and the driven
     /// line stay as they are.
-    Whole(Box<LastingState>),
+    Whole(Box<PersistentState>),
 }

@@ -2,17 +2,17 @@
 
 use std::collections::BTreeMap;
 
-use tandem_gcode::{Lasting, WORK_SYSTEMS};
+use tandem_gcode::{PersistentData, WORK_SYSTEMS};
 use tandem_machine::Machine;
 use tandem_sdk::{AxisVector, MAX_AXES};
 
 /// First and last number of the parameters that last without being asked for, as on most controls.
-pub const LASTING_PARAMETERS: (usize, usize) = (500, 999);
+pub const PERSISTENT_PARAMETERS: (usize, usize) = (500, 999);
 /// First and last number of the parameters that are a program's own: those that the state lists already last too, as in
 /// LinuxCNC's parameter file.
 pub const USER_PARAMETERS: (usize, usize) = (31, 5000);
 
-/// The offsets between program and machine coordinates, as [`Lasting`] has them. Vectors in mm or rad.
+/// The offsets between program and machine coordinates, as [`PersistentData`] has them. Vectors in mm or rad.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct WorkOffsets {
     /// Origin of each coordinate system in machine coordinates, G54 first.
@@ -30,7 +30,7 @@ pub struct WorkOffsets {
 /// Everything that a machine knows from one session to the next, as far as a session needs it to begin. Vectors are in mm or
 /// rad, in the order of the axes with which the store was opened.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct LastingState {
+pub struct PersistentState {
     /// G54 to G59.3, the one in force, and G92.
     pub offsets: WorkOffsets,
     /// The places of G28 and G30 in machine coordinates; none where nobody has stored one: the machine file's `home` counts.
@@ -54,7 +54,7 @@ pub struct LastingState {
     pub alarms: Vec<Alarm>,
 }
 
-impl LastingState {
+impl PersistentState {
     /// What a machine begins with whose file is new: its tool table; nothing else is known.
     pub fn initial(machine: &Machine) -> Self {
         let tools = machine
@@ -70,9 +70,9 @@ impl LastingState {
 
     /// All of it that a part program can see; `home` is the place of G28 and G30 where none was stored. No tool length is in
     /// force, as after power-on everywhere.
-    pub fn to_program(&self, home: &AxisVector) -> Lasting {
+    pub fn to_program(&self, home: &AxisVector) -> PersistentData {
         let parameters = self.parameters.iter().filter(|(_, value)| **value != 0.0);
-        Lasting {
+        PersistentData {
             origins: self.offsets.origins,
             rotations_rad: self.offsets.rotations_rad,
             active_system: self.offsets.active_system,
@@ -88,9 +88,9 @@ impl LastingState {
         }
     }
 
-    /// Whether a value of parameter `number` lasts: one of [`LASTING_PARAMETERS`], or one that is listed already.
+    /// Whether a value of parameter `number` lasts: one of [`PERSISTENT_PARAMETERS`], or one that is listed already.
     pub fn keeps(&self, number: usize) -> bool {
-        (LASTING_PARAMETERS.0..=LASTING_PARAMETERS.1).contains(&number)
+        (PERSISTENT_PARAMETERS.0..=PERSISTENT_PARAMETERS.1).contains(&number)
             || self.parameters.contains_key(&number)
     }
 }

@@ -51,8 +51,8 @@ mod write;
 
 pub use change::Change;
 pub use data::{
-    Alarm, Driven, Job, JobEnd, JobKind, LASTING_PARAMETERS, LastingState, Outcome, Tool, ToolLife,
-    USER_PARAMETERS, WorkOffsets,
+    Alarm, Driven, Job, JobEnd, JobKind, Outcome, PERSISTENT_PARAMETERS, PersistentState, Tool,
+    ToolLife, USER_PARAMETERS, WorkOffsets,
 };
 pub use error::StateError;
 pub use linuxcnc::{AtLine, LinearUnit, LinuxCnc};

@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use tandem_gcode::WORK_SYSTEMS;
 use tandem_sdk::{Axes, AxisVector};
 
-use crate::data::{LastingState, Tool};
+use crate::data::{PersistentState, Tool};
 use crate::write::{MAX_TOOL_NUMBER, is_user_parameter};
 
 /// The order of LinuxCNC's axes in its parameters.
@@ -61,7 +61,7 @@ pub struct LinuxCnc<'a> {
 
 impl LinuxCnc<'_> {
     /// The state as a parameter file; `home` is the place of G28 and G30 where none is stored.
-    pub fn variables(&self, state: &LastingState, home: &AxisVector) -> String {
+    pub fn variables(&self, state: &PersistentState, home: &AxisVector) -> String {
         let offsets = &state.offsets;
         let mut rows: Vec<_> = state
             .parameters
@@ -99,7 +99,7 @@ impl LinuxCnc<'_> {
     }
 
     /// The tools as a tool table: wear is added to what was measured, because LinuxCNC has no place for it.
-    pub fn tools(&self, state: &LastingState) -> String {
+    pub fn tools(&self, state: &PersistentState) -> String {
         let mut text = String::new();
         for tool in state.tools.values() {
             let seen = tool.to_program();
@@ -163,7 +163,7 @@ impl LinuxCnc<'_> {
     pub fn read_variables(
         &self,
         text: &str,
-        state: &mut LastingState,
+        state: &mut PersistentState,
     ) -> Result<Vec<AtLine>, AtLine> {
         let mut left = Vec::new();
         let mut last = 0;
@@ -209,7 +209,12 @@ impl LinuxCnc<'_> {
         Ok(left)
     }
 
-    fn variable(&self, number: usize, value: f64, state: &mut LastingState) -> Result<(), String> {
+    fn variable(
+        &self,
+        number: usize,
+        value: f64,
+        state: &mut PersistentState,
+    ) -> Result<(), String> {
         let offsets = &mut state.offsets;
         let nth = |first: usize| number.checked_sub(first).filter(|nth| *nth < LETTERS.len());
         if let Some((which, nth)) = (0..2).find_map(|which| Some((which, nth(REFERENCES[which])?)))
@@ -258,7 +263,11 @@ impl LinuxCnc<'_> {
     ///
     /// # Errors
     /// A line that cannot be read; `state` is then as far as the line before.
-    pub fn read_tools(&self, text: &str, state: &mut LastingState) -> Result<Vec<AtLine>, AtLine> {
+    pub fn read_tools(
+        &self,
+        text: &str,
+        state: &mut PersistentState,
+    ) -> Result<Vec<AtLine>, AtLine> {
         let mut left = Vec::new();
         let mut seen = BTreeSet::new();
         for (line, text) in (1..).zip(text.lines()) {
@@ -371,13 +380,13 @@ mod tests {
         Axes::new(&[('X', false), ('Y', false), ('Z', false), ('A', true)]).unwrap()
     }
 
-    fn read(variables: bool, text: &str) -> Result<(LastingState, Vec<String>), String> {
+    fn read(variables: bool, text: &str) -> Result<(PersistentState, Vec<String>), String> {
         let axes = mill();
         let files = LinuxCnc {
             axes: &axes,
             unit: LinearUnit::Inch,
         };
-        let mut state = LastingState::default();
+        let mut state = PersistentState::default();
         let read = if variables {
             files.read_variables(text, &mut state)
         } else {

@@ -7,7 +7,7 @@ use rusqlite::{Connection, Row};
 use tandem_gcode::{WORK_SYSTEMS, system_code};
 use tandem_sdk::{Axes, AxisVector};
 
-use crate::data::{Alarm, Driven, Job, JobEnd, JobKind, LastingState, Outcome, Tool, ToolLife};
+use crate::data::{Alarm, Driven, Job, JobEnd, JobKind, Outcome, PersistentState, Tool, ToolLife};
 use crate::error::StateError;
 
 /// Names of the places of G28 and G30.
@@ -56,12 +56,12 @@ impl Rows<'_> {
     }
 
     /// The state as a whole, as one instant saw it.
-    pub fn state(&self) -> Read<LastingState> {
+    pub fn state(&self) -> Read<PersistentState> {
         let at_once = self
             .connection
             .unchecked_transaction()
             .map_err(|error| self.error(&error))?;
-        let mut state = LastingState::default();
+        let mut state = PersistentState::default();
         self.places(&mut state)?;
         self.numbers(&mut state)?;
         let parameters = "SELECT number, value FROM parameter LIMIT ?1";
@@ -101,7 +101,7 @@ impl Rows<'_> {
         self.axes.index(letter.chars().next()?)
     }
 
-    fn places(&self, state: &mut LastingState) -> Read<()> {
+    fn places(&self, state: &mut PersistentState) -> Read<()> {
         let rows = "SELECT name, letter, value FROM place LIMIT ?1";
         let rows = self.all(rows, -1, |row| {
             Ok((
@@ -128,7 +128,7 @@ impl Rows<'_> {
         Ok(())
     }
 
-    fn numbers(&self, state: &mut LastingState) -> Read<()> {
+    fn numbers(&self, state: &mut PersistentState) -> Read<()> {
         let rows = "SELECT name, value FROM number LIMIT ?1";
         let rows = self.all(rows, -1, |row| {
             Ok((row.get::<_, String>(0)?, row.get::<_, f64>(1)?))

@@ -12,7 +12,7 @@ use tandem_machine::Machine;
 use tandem_sdk::{Axes, AxisVector};
 
 use crate::change::Change;
-use crate::data::{Alarm, Driven, Job, LastingState};
+use crate::data::{Alarm, Driven, Job, PersistentState};
 use crate::error::StateError;
 use crate::queue::{Due, Queue, Request};
 use crate::rows::{Rows, axes_of, letters_of};
@@ -56,7 +56,7 @@ pub struct Store {
     writer: Option<JoinHandle<()>>,
     axes: Axes,
     filled: bool,
-    first: LastingState,
+    first: PersistentState,
     copy: Option<PathBuf>,
     next_job: AtomicU64,
     next_alarm: AtomicU64,
@@ -223,8 +223,8 @@ impl Store {
         if self.filled {
             return Ok(());
         }
-        if self.first == LastingState::default() {
-            self.first = LastingState::initial(machine);
+        if self.first == PersistentState::default() {
+            self.first = PersistentState::initial(machine);
         }
         self.commit(vec![Change::Whole(Box::new(self.first.clone()))])?;
         self.filled = true;
@@ -237,7 +237,7 @@ impl Store {
     }
 
     /// What the file held when it was opened.
-    pub fn load(&self) -> &LastingState {
+    pub fn load(&self) -> &PersistentState {
         &self.first
     }
 
@@ -315,7 +315,7 @@ impl Store {
         clippy::redundant_closure_for_method_calls,
         reason = "the method is of one lifetime, the closure of any"
     )]
-    pub fn read_back(&self) -> Result<LastingState, StateError> {
+    pub fn read_back(&self) -> Result<PersistentState, StateError> {
         self.read(|rows| rows.state())
     }
 
@@ -415,7 +415,7 @@ impl Reader {
     ///
     /// # Errors
     /// It cannot be read, or is damaged.
-    pub fn state(&self) -> Result<LastingState, StateError> {
+    pub fn state(&self) -> Result<PersistentState, StateError> {
         self.rows().state()
     }
 

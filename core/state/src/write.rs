@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use rusqlite::{Connection, OptionalExtension, Transaction, params};
-use tandem_gcode::{Lasting, WORK_SYSTEMS, system_code};
+use tandem_gcode::{PersistentData, WORK_SYSTEMS, system_code};
 use tandem_sdk::{Axes, AxisVector, MAX_AXES};
 
 use crate::change::Change;
 use crate::data::{
-    Driven, Job, JobEnd, LASTING_PARAMETERS, LastingState, Tool, ToolLife, USER_PARAMETERS,
+    Driven, Job, JobEnd, PERSISTENT_PARAMETERS, PersistentState, Tool, ToolLife, USER_PARAMETERS,
     WorkOffsets,
 };
 use crate::error::StateError;
@@ -32,7 +32,7 @@ pub(crate) fn is_user_parameter(number: usize) -> bool {
 /// Why a change cannot be kept; judged before anything is written, so that no change of several fails alone.
 pub(crate) fn judge(change: &Change) -> Result<(), StateError> {
     match change {
-        Change::Program(lasting) => judge_program(lasting),
+        Change::Program(persistent) => judge_program(persistent),
         Change::ForgetReference(which) => below("a reference position", *which, REFERENCES.len()),
         Change::ListParameter { number, value } => judge_parameter(*number, *value),
         Change::Tool(tool) => judge_tool(tool),
@@ -58,16 +58,16 @@ pub(crate) fn judge(change: &Change) -> Result<(), StateError> {
     }
 }
 
-fn judge_program(lasting: &Lasting) -> Result<(), StateError> {
-    judge_offsets(&offsets_of(lasting))?;
-    for (name, place) in REFERENCES.iter().zip(&lasting.reference) {
+fn judge_program(persistent: &PersistentData) -> Result<(), StateError> {
+    judge_offsets(&offsets_of(persistent))?;
+    for (name, place) in REFERENCES.iter().zip(&persistent.reference) {
         vector(name, place)?;
     }
-    lasting
+    persistent
         .parameters
         .iter()
         .try_for_each(|(number, value)| finite(&format!("#{number}"), *value))?;
-    lasting.tools.iter().try_for_each(|tool| {
+    persistent.tools.iter().try_for_each(|tool| {
         let mut row = Tool::default();
         row.measure(tool);
         judge_tool(&row)
@@ -88,13 +88,13 @@ fn judge_offsets(offsets: &WorkOffsets) -> Result<(), StateError> {
     vector("what G92.3 restores", &offsets.g92_stored)
 }
 
-fn offsets_of(lasting: &Lasting) -> WorkOffsets {
+fn offsets_of(persistent: &PersistentData) -> WorkOffsets {
     WorkOffsets {
-        origins: lasting.origins,
-        rotations_rad: lasting.rotations_rad,
-        active_system: lasting.active_system,
-        g92: lasting.g92,
-        g92_stored: lasting.g92_stored,
+        origins: persistent.origins,
+        rotations_rad: persistent.rotations_rad,
+        active_system: persistent.active_system,
+        g92: persistent.g92,
+        g92_stored: persistent.g92_stored,
     }
 }
 
@@ -153,7 +153,7 @@ fn judge_end(end: Option<&JobEnd>) -> Result<(), StateError> {
         .try_for_each(|(name, seconds)| finite(&format!("the time limited by {name}"), *seconds))
 }
 
-fn judge_state(state: &LastingState) -> Result<(), StateError> {
+fn judge_state(state: &PersistentState) -> Result<(), StateError> {
     judge_offsets(&state.offsets)?;
     for (name, place) in REFERENCES.iter().zip(&state.reference) {
         vector(name, &place.unwrap_or_default())?;
@@ -266,7 +266,7 @@ impl<'a> Writer<'a> {
 
     pub fn write(&self, change: &Change) -> Done {
         match change {
-            Change::Program(lasting) => self.program(lasting),
+            Change::Program(persistent) => self.program(persistent),
             Change::ForgetReference(which) => self.forget_place(REFERENCES[*which]),
             Change::ListParameter { number, value } => self.parameter(*number, *value),
             Change::Tool(tool) => self.tool(tool),
@@ -305,9 +305,9 @@ impl<'a> Writer<'a> {
     }
 
     /// What differs from the rows is written: they are read instead of being kept, because a request may have changed them too.
-    fn program(&self, lasting: &Lasting) -> Done {
-        self.offsets(&offsets_of(lasting))?;
-        for (name, place) in REFERENCES.iter().zip(&lasting.reference) {
+    fn program(&self, persistent: &PersistentData) -> Done {
+        self.offsets(&offsets_of(persistent))?;
+        for (name, place) in REFERENCES.iter().zip(&persistent.reference) {
             let stored = "SELECT 1 FROM place WHERE name = ?1";
             let is_stored = self
                 .transaction
@@ -318,25 +318,25 @@ impl<'a> Writer<'a> {
                 self.place(name, place)?;
             }
         }
-        self.number("tool_in_spindle", f64::from(lasting.tool_in_spindle))?;
-        self.program_parameters(lasting)?;
-        self.measured(lasting)
+        self.number("tool_in_spindle", f64::from(persistent.tool_in_spindle))?;
+        self.program_parameters(persistent)?;
+        self.measured(persistent)
     }
 
-    fn program_parameters(&self, lasting: &Lasting) -> Done {
+    fn program_parameters(&self, persistent: &PersistentData) -> Done {
         let mut rows = self
             .transaction
             .prepare("SELECT number, value FROM parameter")?;
         let rows = rows.query_map([], |row| Ok((row.get::<_, u32>(0)?, row.get::<_, f64>(1)?)))?;
         let rows = rows.collect::<rusqlite::Result<BTreeMap<_, _>>>()?;
         for (number, value) in &rows {
-            let now = lasting.parameters.get(number).copied().unwrap_or(0.0);
+            let now = persistent.parameters.get(number).copied().unwrap_or(0.0);
             if now != *value {
                 self.parameter(*number as usize, now)?;
             }
         }
-        let lasts = LASTING_PARAMETERS.0 as u32..=LASTING_PARAMETERS.1 as u32;
-        let new = lasting
+        let lasts = PERSISTENT_PARAMETERS.0 as u32..=PERSISTENT_PARAMETERS.1 as u32;
+        let new = persistent
             .parameters
             .range(lasts)
             .filter(|(number, _)| !rows.contains_key(number));
@@ -436,14 +436,14 @@ impl<'a> Writer<'a> {
     }
 
     /// What [`Tool::measure`] does, where a row of the table says something else.
-    fn measured(&self, lasting: &Lasting) -> Done {
+    fn measured(&self, persistent: &PersistentData) -> Done {
         let rows = Rows {
             connection: &self.transaction,
             path: Path::new(""),
             axes: self.axes,
         };
         let mut tools = rows.tools()?;
-        for measured in &lasting.tools {
+        for measured in &persistent.tools {
             let row = tools.entry(measured.number).or_default();
             let seen = row.to_program();
             if (seen.number, seen.offset, seen.diameter_mm)
@@ -489,7 +489,7 @@ impl<'a> Writer<'a> {
         Ok(())
     }
 
-    fn whole(&self, state: &LastingState) -> Done {
+    fn whole(&self, state: &PersistentState) -> Done {
         for table in [
             "place",
             "number",

@@ -13,7 +13,7 @@ use common::{any_state, machine_of};
 use tandem_gcode::{Config, Interpreter, Item};
 use tandem_rig::Random;
 use tandem_sdk::{Axes, AxisVector};
-use tandem_state::{LastingState, LinearUnit, LinuxCnc};
+use tandem_state::{LinearUnit, LinuxCnc, PersistentState};
 
 /// What `LinuxCNC`'s files keep of a value: nine decimals, in degrees or the unit.
 fn is_near(a: f64, b: f64) -> bool {
@@ -25,7 +25,7 @@ fn is_near_vector(a: &AxisVector, b: &AxisVector) -> bool {
 }
 
 /// A state as a shop may have it: nothing is far away, nor so near to zero that `LinuxCNC` takes it for that.
-fn shop(random: &mut Random, axes: &Axes) -> LastingState {
+fn shop(random: &mut Random, axes: &Axes) -> PersistentState {
     let mut state = any_state(random, axes);
     let near = |vector: AxisVector| {
         vector.map(|value| {
@@ -64,7 +64,7 @@ fn what_is_exported_is_read_again() {
         let unit = random.pick(&[LinearUnit::Mm, LinearUnit::Inch]);
         let files = LinuxCnc { axes: &axes, unit };
         let home = AxisVector::ZERO.map(|_| random.unit());
-        let mut again = LastingState::default();
+        let mut again = PersistentState::default();
         let left = files
             .read_variables(&files.variables(&state, &home), &mut again)
             .unwrap();
@@ -136,7 +136,7 @@ fn judged(
     judge: &Path,
     folder: &Path,
     files: &LinuxCnc<'_>,
-    state: &LastingState,
+    state: &PersistentState,
     program: &str,
 ) -> Vec<f64> {
     let write = |name: &str, text: &str| {
@@ -253,7 +253,7 @@ fn linuxcnc_agrees_on_what_it_is_given() {
         );
         assert_eq!(theirs.len(), asked.len(), "seed {seed}");
         let config = Config {
-            lasting: Some(Arc::new(state.to_program(&AxisVector::ZERO))),
+            persistent: Some(Arc::new(state.to_program(&AxisVector::ZERO))),
             ..Config::new(axes)
         };
         let mut interpreter = Interpreter::new(config);

@@ -11,8 +11,8 @@ use tandem_machine::Machine;
 use tandem_rig::Random;
 use tandem_sdk::{Axes, AxisVector};
 use tandem_state::{
-    Alarm, Change, Driven, Job, JobEnd, JobKind, LastingState, Outcome, Owner, Reader, StateError,
-    Store, Tool, ToolLife,
+    Alarm, Change, Driven, Job, JobEnd, JobKind, Outcome, Owner, PersistentState, Reader,
+    StateError, Store, Tool, ToolLife,
 };
 
 fn folder() -> (tempfile::TempDir, PathBuf) {
@@ -64,12 +64,12 @@ fn a_file_begins_with_what_the_machine_says_and_keeps_what_it_holds_when_it_is_o
     let machine = example();
     let mut begun = Store::open(&path, Owner::of(&machine)).unwrap();
     begun.fill(&machine).unwrap();
-    assert_eq!(begun.load(), &LastingState::initial(&machine));
+    assert_eq!(begun.load(), &PersistentState::initial(&machine));
     let mut state = begun.load().clone();
     state.offsets.origins[1] = AxisVector::from_slice(&[12.5]);
     state.parameters.insert(600, 7.0);
-    let lasting = Arc::new(state.to_program(&machine.home));
-    begun.commit(vec![Change::Program(lasting)]).unwrap();
+    let persistent = Arc::new(state.to_program(&machine.home));
+    begun.commit(vec![Change::Program(persistent)]).unwrap();
     drop(begun);
     let mut again = Store::open(&path, Owner::of(&machine)).unwrap();
     again.fill(&machine).unwrap();
@@ -83,10 +83,10 @@ fn values_of_a_file_that_was_never_given_initial_ones_stay() {
     let (_folder, path) = folder();
     let machine = example();
     let store = Store::open(&path, Owner::of(&machine)).unwrap();
-    let mut state = LastingState::default();
+    let mut state = PersistentState::default();
     state.offsets.origins[2] = AxisVector::from_slice(&[0.0, -4.0]);
-    let lasting = Arc::new(state.to_program(&machine.home));
-    store.commit(vec![Change::Program(lasting)]).unwrap();
+    let persistent = Arc::new(state.to_program(&machine.home));
+    store.commit(vec![Change::Program(persistent)]).unwrap();
     drop(store);
     let mut store = Store::open(&path, Owner::of(&machine)).unwrap();
     store.fill(&machine).unwrap();
@@ -99,7 +99,7 @@ fn axes_may_come_go_and_change_their_order() {
     let (_folder, path) = folder();
     let full = mill();
     let origin = AxisVector::from_slice(&[1.0, 2.0, 3.0, 4.0]);
-    let mut state = LastingState::default();
+    let mut state = PersistentState::default();
     state.offsets.origins[0] = origin;
     open(&path, &full)
         .unwrap()
@@ -213,12 +213,12 @@ fn changes_one_by_one_end_where_the_state_says() {
     let mut new = Tool::default();
     new.measure(&measured(6));
     assert_eq!(tool.wear, AxisVector::ZERO);
-    let mut expected = LastingState {
+    let mut expected = PersistentState {
         parameters: BTreeMap::from([(101, 4.0), (102, 0.0), (500, 2.0)]),
         tools: BTreeMap::from([(3, tool), (5, worn), (6, new)]),
         reference: [Some(place), None],
         last_position: Some(place),
-        ..LastingState::default()
+        ..PersistentState::default()
     };
     expected.turns[3] = -2;
     expected.offsets.active_system = 8;
@@ -339,8 +339,8 @@ fn what_is_no_number_is_refused_and_takes_nothing_with_it() {
         ..Tool::default()
     };
     tool.wear[2] = f64::INFINITY;
-    let program = |spoil: &dyn Fn(&mut LastingState)| {
-        let mut state = LastingState::default();
+    let program = |spoil: &dyn Fn(&mut PersistentState)| {
+        let mut state = PersistentState::default();
         spoil(&mut state);
         change(&state)
     };
@@ -358,9 +358,9 @@ fn what_is_no_number_is_refused_and_takes_nothing_with_it() {
             number: 0,
             ..Tool::default()
         })),
-        Change::Whole(Box::new(LastingState {
+        Change::Whole(Box::new(PersistentState {
             tools: BTreeMap::from([(5, tool)]),
-            ..LastingState::default()
+            ..PersistentState::default()
         })),
         Change::PolicyParameter {
             name: "x".repeat(100_000),
@@ -374,7 +374,7 @@ fn what_is_no_number_is_refused_and_takes_nothing_with_it() {
         );
         assert_eq!(store.recorder().record(bad).unwrap_err(), refusal);
     }
-    assert_eq!(store.read_back().unwrap(), LastingState::default());
+    assert_eq!(store.read_back().unwrap(), PersistentState::default());
 }
 
 #[test]
@@ -382,9 +382,9 @@ fn one_process_writes_and_others_look() {
     let (_folder, path) = folder();
     let axes = mill();
     let in_spindle = |number| {
-        change(&LastingState {
+        change(&PersistentState {
             tool_in_spindle: number,
-            ..LastingState::default()
+            ..PersistentState::default()
         })
     };
     let missing = Reader::open(&path).unwrap_err();

@@ -1,7 +1,7 @@
 //! Faults of devices, switched on and off.
 
 use crate::bus::Bus;
-use crate::drive::Lasting;
+use crate::drive::Condition;
 use crate::esc::Clocking;
 use crate::faults::What;
 
@@ -87,14 +87,14 @@ impl crate::device::Device {
         match what {
             What::DriveFault { code, stays, .. } => {
                 trouble.fault = on.then_some(*code);
-                trouble.set(Lasting::FaultStays, on && *stays);
+                trouble.set(Condition::FaultStays, on && *stays);
             }
-            What::NeverEnables { .. } => trouble.set(Lasting::NeverEnables, on),
+            What::NeverEnables { .. } => trouble.set(Condition::NeverEnables, on),
             What::DisablesItself { .. } => trouble.disable = on,
             What::Brake { open_ms, .. } => trouble.brake_ms = on.then_some(*open_ms),
             What::ModeShown { mode, .. } => trouble.mode_shown = on.then_some(*mode),
-            What::TorqueOff { .. } => trouble.set(Lasting::TorqueOff, on),
-            What::Blocked { .. } => trouble.set(Lasting::Blocked, on),
+            What::TorqueOff { .. } => trouble.set(Condition::TorqueOff, on),
+            What::Blocked { .. } => trouble.set(Condition::Blocked, on),
             What::Load { share, .. } => drive.set_load(if on { *share } else { 0.0 }),
             _ => {}
         }

@@ -111,7 +111,7 @@ pub fn judge(bytes: &[u8]) {
         enable: true,
         script: vec![],
         uptime_periods: 0,
-        lasting: None,
+        persistent: None,
     };
     let mut controller = Controller::open(&MACHINE, &REGISTRY, options, Box::new(NoPersistence))
         .expect("a controller");

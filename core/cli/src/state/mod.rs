@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use tandem_machine::Machine;
-use tandem_state::{AtLine, Change, LastingState, LinuxCnc, Owner, Reader, Store, default_path};
+use tandem_state::{AtLine, Change, LinuxCnc, Owner, PersistentState, Reader, Store, default_path};
 
 use crate::args::{Files, Of, State};
 
@@ -65,7 +65,7 @@ fn import(of: &Of, files: &Files) -> Result<u8, Box<dyn Error>> {
     let (machine, path) = file(of)?;
     let store = Store::open(&path, Owner::of(&machine))?;
     let mut state = if store.is_new() {
-        LastingState::initial(&machine)
+        PersistentState::initial(&machine)
     } else {
         store.load().clone()
     };

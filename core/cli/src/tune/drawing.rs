@@ -7,7 +7,7 @@ use tandem_batch::{Job, Lines, Scene, Tried, WorstDeviation, set_of, simulate_wi
 use tandem_recorder::Output;
 use tandem_report::{TuneParameter, TunePoint, TuneReport, TuneScene, TuneStep};
 
-use super::{Made, label, stated_value, verdict, with_unit};
+use super::{TuneRun, label, stated_value, verdict, with_unit};
 
 /// Half of the width of the drawing of paths, as a multiple of the largest deviation in it.
 const RADIUS_OF_DEVIATION: f64 = 14.0;
@@ -15,8 +15,8 @@ const RADIUS_OF_DEVIATION: f64 = 14.0;
 const MIN_RADIUS_MM: f64 = 0.02;
 
 /// Writes the page.
-pub fn write(path: &Path, made: &Made<'_>, chosen: usize) -> Result<(), String> {
-    let report = report(made, chosen);
+pub fn write(path: &Path, run: &TuneRun<'_>, chosen: usize) -> Result<(), String> {
+    let report = report(run, chosen);
     let mut out = Output::create(path)?;
     report
         .write(&mut out)
@@ -24,8 +24,8 @@ pub fn write(path: &Path, made: &Made<'_>, chosen: usize) -> Result<(), String> 
     out.finish()
 }
 
-fn report(made: &Made<'_>, chosen: usize) -> TuneReport {
-    let (task, tuned) = (made.task, made.tuned);
+fn report(run: &TuneRun<'_>, chosen: usize) -> TuneReport {
+    let (task, tuned) = (run.task, run.tuned);
     let [first, second] = [label(&task.objective), label(&task.against)];
     let at = |point: &Tried| {
         Some([
@@ -41,7 +41,7 @@ fn report(made: &Made<'_>, chosen: usize) -> TuneReport {
         keep.map(|keep| keep.limit * scale)
     };
     let with_numbers = || tuned.points.iter().filter(|point| point.cause.is_none());
-    let shown = shown_points(made, chosen);
+    let shown = shown_points(run, chosen);
     let mut marks = vec![];
     for (name, place, style) in [("as it is", 0, 2), ("chosen", chosen, 1)] {
         if let Some(at) = tuned.points[place]
@@ -54,16 +54,16 @@ fn report(made: &Made<'_>, chosen: usize) -> TuneReport {
         }
     }
     TuneReport {
-        title: format!("Settings of {}", made.machine.name),
-        facts: facts(made),
-        verdict: verdict(made, chosen),
+        title: format!("Settings of {}", run.machine.name),
+        facts: facts(run),
+        verdict: verdict(run, chosen),
         names: [first.0.clone(), second.0.clone()],
         points: with_numbers()
             .filter_map(|point| {
                 Some(TunePoint {
                     at: at(point)?,
                     kept: point.is_kept(),
-                    label: words(made, point),
+                    label: words(run, point),
                 })
             })
             .collect(),
@@ -78,23 +78,23 @@ fn report(made: &Made<'_>, chosen: usize) -> TuneReport {
             limit(&task.against, second.1),
         ],
         parameters: (0..tuned.walks.len())
-            .map(|index| parameter(made, index, chosen, &at))
+            .map(|index| parameter(run, index, chosen, &at))
             .collect(),
-        scene: scene(made, &shown),
-        table: table(made, &shown),
-        notes: notes(made),
+        scene: scene(run, &shown),
+        table: table(run, &shown),
+        notes: notes(run),
     }
 }
 
-fn facts(made: &Made<'_>) -> Vec<(String, String)> {
+fn facts(run: &TuneRun<'_>) -> Vec<(String, String)> {
     let mut facts = vec![
-        ("programs".to_string(), made.programs.join(", ")),
+        ("programs".to_string(), run.programs.join(", ")),
         (
             "settings tried".to_string(),
-            made.tuned.points.len().to_string(),
+            run.tuned.points.len().to_string(),
         ),
     ];
-    for keep in &made.task.keeps {
+    for keep in &run.task.keeps {
         let sign = if keep.at_least { "≥" } else { "≤" };
         facts.push((
             keep.key.clone(),
@@ -105,8 +105,8 @@ fn facts(made: &Made<'_>) -> Vec<(String, String)> {
 }
 
 /// The settings of a point.
-fn words(made: &Made<'_>, point: &Tried) -> String {
-    let set = set_of(&made.task.parameters, point.values.as_ref());
+fn words(run: &TuneRun<'_>, point: &Tried) -> String {
+    let set = set_of(&run.task.parameters, point.values.as_ref());
     if set.is_empty() {
         "the machine as it is".to_string()
     } else {
@@ -115,8 +115,8 @@ fn words(made: &Made<'_>, point: &Tried) -> String {
 }
 
 /// Up to three points with their names: the fastest of the front, the chosen one, the most exact of the front.
-fn shown_points(made: &Made<'_>, chosen: usize) -> Vec<(&'static str, usize)> {
-    let front = &made.tuned.front;
+fn shown_points(run: &TuneRun<'_>, chosen: usize) -> Vec<(&'static str, usize)> {
+    let front = &run.tuned.front;
     let mut shown: Vec<(&str, usize)> = vec![("chosen", chosen)];
     for (name, place) in [
         ("least of all deviations", front.first()),
@@ -136,12 +136,12 @@ fn shown_points(made: &Made<'_>, chosen: usize) -> Vec<(&'static str, usize)> {
 }
 
 fn parameter(
-    made: &Made<'_>,
+    run: &TuneRun<'_>,
     index: usize,
     chosen: usize,
     at: &dyn Fn(&Tried) -> Option<[f64; 2]>,
 ) -> TuneParameter {
-    let (parameter, tuned) = (&made.task.parameters[index], made.tuned);
+    let (parameter, tuned) = (&run.task.parameters[index], run.tuned);
     let steps: Vec<TuneStep> = tuned.walks[index]
         .iter()
         .map(|place| {
@@ -162,13 +162,13 @@ fn parameter(
         .collect();
     TuneParameter {
         name: parameter.name(),
-        worth: worth(made, &steps),
+        worth: worth(run, &steps),
         steps,
     }
 }
 
 /// What a parameter is worth, from its least to its greatest effect.
-fn worth(made: &Made<'_>, steps: &[TuneStep]) -> String {
+fn worth(run: &TuneRun<'_>, steps: &[TuneStep]) -> String {
     let range = |index: usize| {
         let values = || steps.iter().filter_map(move |step| Some(step.at?[index]));
         let low = values().fold(f64::INFINITY, f64::min);
@@ -189,9 +189,9 @@ fn worth(made: &Made<'_>, steps: &[TuneStep]) -> String {
     };
     let mut text = format!(
         "{} changes by {:.1} %, {} by {:.1} %.",
-        name(&made.task.objective),
+        name(&run.task.objective),
         range(0),
-        name(&made.task.against),
+        name(&run.task.against),
         range(1)
     );
     let none = steps.iter().filter(|step| step.at.is_none()).count();
@@ -201,9 +201,9 @@ fn worth(made: &Made<'_>, steps: &[TuneStep]) -> String {
     text
 }
 
-fn table(made: &Made<'_>, shown: &[(&'static str, usize)]) -> Vec<Vec<String>> {
-    let (task, points) = (made.task, &made.tuned.points);
-    let machine: toml::Table = made.machine.effective_toml().parse().unwrap_or_default();
+fn table(run: &TuneRun<'_>, shown: &[(&'static str, usize)]) -> Vec<Vec<String>> {
+    let (task, points) = (run.task, &run.tuned.points);
+    let machine: toml::Table = run.machine.effective_toml().parse().unwrap_or_default();
     let head = ["", "as it is"]
         .into_iter()
         .chain(shown.iter().map(|(name, _)| *name));
@@ -253,9 +253,9 @@ fn table(made: &Made<'_>, shown: &[(&'static str, usize)]) -> Vec<Vec<String>> {
     rows
 }
 
-fn notes(made: &Made<'_>) -> Vec<String> {
+fn notes(run: &TuneRun<'_>) -> Vec<String> {
     let mut notes = vec![];
-    let broken: Vec<&str> = made
+    let broken: Vec<&str> = run
         .tuned
         .points
         .iter()
@@ -271,10 +271,10 @@ fn notes(made: &Made<'_>) -> Vec<String> {
 }
 
 /// The ways of the shown points around the place where one of them leaves the path furthest.
-fn scene(made: &Made<'_>, shown: &[(&'static str, usize)]) -> Option<TuneScene> {
+fn scene(run: &TuneRun<'_>, shown: &[(&'static str, usize)]) -> Option<TuneScene> {
     let places = shown
         .iter()
-        .flat_map(|(_, point)| made.tuned.points[*point].worst.iter().enumerate());
+        .flat_map(|(_, point)| run.tuned.points[*point].worst.iter().enumerate());
     let (program, worst): (usize, &WorstDeviation) =
         places.max_by(|(_, a), (_, b)| a.deviation_mm.total_cmp(&b.deviation_mm))?;
     if worst.deviation_mm <= 0.0 {
@@ -284,17 +284,17 @@ fn scene(made: &Made<'_>, shown: &[(&'static str, usize)]) -> Option<TuneScene> 
     let mut scenes = vec![];
     for (name, point) in shown {
         let job = Job {
-            program: made.task.programs[program].clone(),
-            machine: made.task.machine.clone(),
+            program: run.task.programs[program].clone(),
+            machine: run.task.machine.clone(),
             set: set_of(
-                &made.task.parameters,
-                made.tuned.points[*point].values.as_ref(),
+                &run.task.parameters,
+                run.tuned.points[*point].values.as_ref(),
             ),
-            block_delete: made.task.block_delete,
+            block_delete: run.task.block_delete,
         };
-        let mut scene = Scene::new(made.machine, &worst.at_mm, radius_mm);
+        let mut scene = Scene::new(run.machine, &worst.at_mm, radius_mm);
         // A point that was driven once is driven again, to the bit.
-        simulate_with(&job, made.inputs, made.plugins, &mut scene).ok()?;
+        simulate_with(&job, run.inputs, run.plugins, &mut scene).ok()?;
         scenes.push((*name, scene));
     }
     let letters = scenes[0].1.letters();
@@ -317,7 +317,7 @@ fn scene(made: &Made<'_>, shown: &[(&'static str, usize)]) -> Option<TuneScene> 
             .collect()
     };
     let deviation = |place: usize| {
-        let mm = made.tuned.points[place]
+        let mm = run.tuned.points[place]
             .worst
             .get(program)
             .map_or(0.0, |worst| worst.deviation_mm);
@@ -326,7 +326,7 @@ fn scene(made: &Made<'_>, shown: &[(&'static str, usize)]) -> Option<TuneScene> 
     Some(TuneScene {
         place: format!(
             "{}, around line {}, where {:.1} µm off the path was the most",
-            made.programs[program],
+            run.programs[program],
             worst.line,
             1e3 * worst.deviation_mm
         ),

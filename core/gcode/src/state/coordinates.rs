@@ -2,7 +2,7 @@
 
 use tandem_sdk::AxisVector;
 
-use crate::lasting::Lasting;
+use crate::persistent::PersistentData;
 
 /// Number of work coordinate systems, G54 to G59.3.
 pub(crate) const SYSTEMS: usize = 9;
@@ -221,24 +221,24 @@ impl Coordinates {
     }
 
     /// Says what lasts of them.
-    pub fn tell(&self, lasting: &mut Lasting) {
-        lasting.origins = self.origins;
-        lasting.rotations_rad = self.rotations;
-        lasting.active_system = self.active;
-        (lasting.g92, lasting.g92_stored) = (self.g92, self.g92_stored);
-        lasting.reference = self.reference;
-        lasting.tool_offset = self.tool;
+    pub fn tell(&self, persistent: &mut PersistentData) {
+        persistent.origins = self.origins;
+        persistent.rotations_rad = self.rotations;
+        persistent.active_system = self.active;
+        (persistent.g92, persistent.g92_stored) = (self.g92, self.g92_stored);
+        persistent.reference = self.reference;
+        persistent.tool_offset = self.tool;
     }
 
     /// Takes what has lasted.
-    pub fn hear(&mut self, lasting: &Lasting) {
-        self.origins = lasting.origins;
-        self.rotations = lasting.rotations_rad;
-        self.active = lasting.active_system.min(SYSTEMS - 1);
-        (self.g92, self.g92_stored) = (lasting.g92, lasting.g92_stored);
+    pub fn hear(&mut self, persistent: &PersistentData) {
+        self.origins = persistent.origins;
+        self.rotations = persistent.rotations_rad;
+        self.active = persistent.active_system.min(SYSTEMS - 1);
+        (self.g92, self.g92_stored) = (persistent.g92, persistent.g92_stored);
         self.g92_applies = self.g92 != AxisVector::ZERO;
-        self.reference = lasting.reference;
-        self.tool = lasting.tool_offset;
+        self.reference = persistent.reference;
+        self.tool = persistent.tool_offset;
         self.sum_up();
     }
 

@@ -26,7 +26,7 @@ const LOCAL: usize = 30;
 type Names = HashMap<Box<[u8]>, Value>;
 
 /// Parameters that outlive the program that sets them: those of the user, and what probes have found.
-const LASTING: [std::ops::RangeInclusive<usize>; 2] = [LOCAL + 1..=5000, 5061..=5070];
+const PERSISTENT: [std::ops::RangeInclusive<usize>; 2] = [LOCAL + 1..=5000, 5061..=5070];
 
 /// A parameter that was set, and outlives its program.
 #[derive(Clone, Debug)]
@@ -95,15 +95,15 @@ impl Parameters {
     }
 
     /// Numbered parameters that last and are not zero.
-    pub fn lasting(&self) -> BTreeMap<u32, f64> {
-        let numbers = LASTING.into_iter().flatten();
+    pub fn persistent_data(&self) -> BTreeMap<u32, f64> {
+        let numbers = PERSISTENT.into_iter().flatten();
         let set = numbers.map(|number| (number as u32, self.numbered[number].number));
         set.filter(|(_, value)| *value != 0.0).collect()
     }
 
     /// Sets numbered parameters that last; those that are not named are zero. A number that is none of them is passed over.
-    pub fn set_lasting(&mut self, values: &BTreeMap<u32, f64>) {
-        for number in LASTING.into_iter().flatten() {
+    pub fn set_persistent_data(&mut self, values: &BTreeMap<u32, f64>) {
+        for number in PERSISTENT.into_iter().flatten() {
             let number_value = values.get(&(number as u32)).copied().unwrap_or(0.0);
             self.set_numbered(number, number_value, false);
         }
@@ -197,7 +197,7 @@ impl Parameters {
             assumed,
         };
         if let Some(log) = &mut self.log
-            && LASTING.iter().any(|range| range.contains(&number))
+            && PERSISTENT.iter().any(|range| range.contains(&number))
         {
             log.push(Written::Numbered(number, value));
         }

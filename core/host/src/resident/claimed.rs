@@ -15,7 +15,7 @@ use crate::joints::JointSpace;
 use crate::plugins::hang::HangWatch;
 use crate::plugins::registry::Registry;
 use crate::run::begin;
-use crate::run::job::Made;
+use crate::run::job::JobParts;
 use crate::setup::claim::stands;
 use crate::setup::ready::{Plugins, Ready};
 use crate::switches::{Clock, Switches};
@@ -160,12 +160,12 @@ impl Claimed {
                 .fold(0, |axes, of| axes | 1 << of.axis);
         }
         let shared = (Arc::clone(session.controls), Arc::clone(session.status));
-        let made = Made::of(ready, &attached, clock == Clock::Wall, shared);
+        let parts = JobParts::of(ready, &attached, clock == Clock::Wall, shared);
         let mut fine = Box::new(FineLoop::new(
-            &made.config,
-            made.end,
+            &parts.config,
+            parts.end,
             driver,
-            made.kinematics,
+            parts.kinematics,
         ));
         fine.stay();
         fine.begin_ended();

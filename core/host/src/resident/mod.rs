@@ -26,7 +26,7 @@ use crate::plugins::hang::HangWatch;
 use crate::plugins::plugin_log::drain_plugin_log;
 use crate::plugins::registry::Registry;
 use crate::policy::PolicyHost;
-use crate::run::job::{Conclusion, Job, Made};
+use crate::run::job::{Conclusion, Job, JobParts};
 use crate::run::periods;
 use crate::setup::commands::with_user_commands;
 use crate::setup::parts;
@@ -66,7 +66,7 @@ pub struct Resident<'r> {
 
 /// A job that is ready to be driven; nothing has moved.
 pub struct PreparedJob {
-    made: Box<Made>,
+    parts: Box<JobParts>,
     homes: u32,
     /// The gantries are apart meanwhile.
     apart: Option<Box<Apart>>,
@@ -90,12 +90,12 @@ pub struct JobOutcome {
 impl PreparedJob {
     /// What the first pass found: totals, and warnings.
     pub fn checked(&self) -> &CheckReport {
-        &self.made.job.checked
+        &self.parts.job.checked
     }
 
     /// The job, for whoever records it.
     pub(crate) fn job(&self) -> &Job {
-        &self.made.job
+        &self.parts.job
     }
 
     /// Names of the feed strategy's signals, and after them those of the analog inputs.
@@ -370,9 +370,9 @@ impl<'r> Resident<'r> {
 
     fn prepared(&self, ready: Ready, homes: u32) -> PreparedJob {
         let shared = (Arc::clone(&self.controls), Arc::clone(&self.status));
-        let made = Made::of(ready, &self.attached, self.clock == Clock::Wall, shared);
+        let parts = JobParts::of(ready, &self.attached, self.clock == Clock::Wall, shared);
         PreparedJob {
-            made: Box::new(made),
+            parts: Box::new(parts),
             homes,
             apart: None,
         }
@@ -436,13 +436,17 @@ impl<'r> Resident<'r> {
         observer: &mut dyn RunObserver,
     ) -> Result<JobOutcome, HostError> {
         let started = Instant::now();
-        let PreparedJob { made, homes, apart } = job;
-        let Made {
+        let PreparedJob {
+            parts,
+            homes,
+            apart,
+        } = job;
+        let JobParts {
             job,
             config,
             end,
             kinematics,
-        } = *made;
+        } = *parts;
         let driver = Box::new(NoDriver);
         let mut fine = Box::new(FineLoop::new(&config, end, driver, kinematics));
         fine.stay();

@@ -46,7 +46,7 @@ pub struct Job {
 }
 
 /// A job, and what its fine loop is made of.
-pub struct Made {
+pub struct JobParts {
     pub job: Job,
     pub config: FineConfig,
     pub end: FineEnd,
@@ -54,7 +54,7 @@ pub struct Made {
     pub kinematics: Option<Box<dyn Kinematics>>,
 }
 
-impl Made {
+impl JobParts {
     /// The job of `ready` on drives that stand as `attached` says. In `real_time` samples have room for a recorder that looks
     /// away. The operator's atomics and the fine loop's status are `shared` with the jobs before and after. Allocates.
     pub fn of(

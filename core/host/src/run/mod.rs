@@ -40,7 +40,7 @@ use crate::setup::rules;
 use crate::soft::command::Timed;
 use crate::soft::soft_loop::RunObserver;
 use crate::switches::{Clock, Lead, Switches};
-use job::{Job, Made};
+use job::{Job, JobParts};
 use squaring::{Squared, Squaring};
 
 /// A run that is ready: the program is checked, the plugins are open, nothing has moved.
@@ -158,15 +158,15 @@ impl Run {
             )?);
             driver = Box::new(NoDriver);
         }
-        let made = Made::of(ready, &attached, false, shared);
+        let parts = JobParts::of(ready, &attached, false, shared);
         let mut fine = Box::new(FineLoop::new(
-            &made.config,
-            made.end,
+            &parts.config,
+            parts.end,
             driver,
-            made.kinematics,
+            parts.kinematics,
         ));
         fine.reset();
-        let job = made.job;
+        let job = parts.job;
         let simulated = job.roster.describe().simulated != 0;
         Ok(Self {
             watch,

@@ -11,7 +11,7 @@ use tandem_machine::Machine;
 use tandem_rings::{Controls, Rest, Status};
 use tandem_sdk::{Attached, Driver, Event};
 
-use super::job::{Job, Made};
+use super::job::{Job, JobParts};
 use crate::clock::periods::Body;
 use crate::clock::virtual_clock;
 use crate::clock::wall_clock::{Ended, FineBody, Periods, TimedThread, give_room};
@@ -77,12 +77,12 @@ impl Squaring {
                 return Err(refused);
             }
         };
-        let made = Made::of(ready, attached, false, shared);
-        let mut fine = FineLoop::new(&made.config, made.end, driver, made.kinematics);
+        let parts = JobParts::of(ready, attached, false, shared);
+        let mut fine = FineLoop::new(&parts.config, parts.end, driver, parts.kinematics);
         fine.stay();
         fine.reset();
         Ok(Self {
-            job: made.job,
+            job: parts.job,
             fine,
         })
     }

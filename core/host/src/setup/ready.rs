@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use tandem_faults::{Faults, Joints};
 use tandem_gcode::{
-    CheckReport, Config, Lasting, Ledger, Program, Stream, SwitchedOn, Watched, check,
+    CheckReport, Config, PersistentData, Program, StateTags, Stream, SwitchedOn, Watched, check,
 };
 use tandem_machine::Machine;
 use tandem_rough::Source;
@@ -54,9 +54,9 @@ pub struct Ready {
 #[derive(Clone, Default)]
 pub struct Memory {
     /// Offsets, parameters and tools as they are when the program begins.
-    pub lasting: Arc<Lasting>,
+    pub persistent: Arc<PersistentData>,
     /// What its lines change, until the path reaches them.
-    pub ledger: Ledger,
+    pub state_tags: StateTags,
     /// Spindle and coolant as they are then.
     pub on: SwitchedOn,
 }
@@ -65,8 +65,8 @@ impl Memory {
     /// The interpreter's view of the machine with it.
     pub fn config(&self, machine: &Machine, simulated: bool, switches: Switches) -> Config {
         let mut config = parts::interpreter_config(machine, simulated, switches);
-        config.tools.clone_from(&self.lasting.tools);
-        config.lasting = Some(Arc::clone(&self.lasting));
+        config.tools.clone_from(&self.persistent.tools);
+        config.persistent = Some(Arc::clone(&self.persistent));
         config.on = self.on;
         config
     }
@@ -276,7 +276,7 @@ impl Ready {
         feed(&machine, registry, &plugins, policy.as_ref(), 0.0)?;
         let name = program.name().to_string();
         let mut stream = Stream::new(program, &config)?;
-        stream.tell(memory.ledger.clone());
+        stream.tell(memory.state_tags.clone());
         let parts = (name, stream, plugins, policy);
         Self::of_stream(machine, registry, parts, passed, switches)
     }

@@ -20,14 +20,14 @@ struct Kept {
     /// Gives an abort before the sample of this tick.
     abort_at: Option<(u64, Arc<tandem_rings::Controls>)>,
     stop_at: Option<(u64, Arc<tandem_rings::Controls>)>,
-    reached: Option<tandem_gcode::Ledger>,
+    reached: Option<tandem_gcode::StateTags>,
 }
 
 impl RunObserver for Kept {
     fn sample(&mut self, sample: &Sample, _deviation_mm: f64, _signals: &[f64]) {
         self.samples.push(*sample);
-        if let Some(ledger) = &self.reached {
-            ledger.reach(sample.block);
+        if let Some(state_tags) = &self.reached {
+            state_tags.reach(sample.block);
         }
         let is_at = |at: &Option<(u64, Arc<tandem_rings::Controls>)>| {
             at.as_ref().is_some_and(|(tick, _)| *tick == sample.tick)
@@ -73,7 +73,7 @@ fn program(text: &str) -> Program {
 fn memory(machine: &Machine) -> Memory {
     let interpreter = Interpreter::new(interpreter_config(machine, true, Switches::default()));
     Memory {
-        lasting: Arc::new(interpreter.lasting()),
+        persistent: Arc::new(interpreter.persistent_data()),
         ..Memory::default()
     }
 }

@@ -2,8 +2,8 @@
 
 use super::contract::contract;
 use crate::{
-    Attached, Driver, DriverContext, DriverDescription, Feedback, Made, PluginError, Setpoint,
-    Words,
+    Attached, Driver, DriverContext, DriverDescription, Feedback, PluginError, PluginResult,
+    Setpoint, Words,
 };
 
 contract! {
@@ -36,7 +36,7 @@ fn forget(error: PluginError) {
 }
 
 /// Makes a driver behind its table.
-pub fn open(table: &'static Table, name: &'static str, options: &str) -> Made<dyn Driver> {
+pub fn open(table: &'static Table, name: &'static str, options: &str) -> PluginResult<dyn Driver> {
     Ok(Box::new(Linked(Calls::make(table, name, options)?)))
 }
 

@@ -6,7 +6,7 @@ use std::mem::MaybeUninit;
 use super::contract::contract;
 use super::entry::{CallGuard, Instance};
 use super::watch::converting;
-use crate::{AxisVector, Kinematics, KinematicsContext, Made, PluginError};
+use crate::{AxisVector, Kinematics, KinematicsContext, PluginError, PluginResult};
 
 /// A conversion of one vector. One that fails gives numbers that are none, and `health` has the error.
 type Convert = unsafe extern "C" fn(*mut c_void, *const AxisVector) -> AxisVector;
@@ -66,7 +66,7 @@ pub fn open(
     name: &'static str,
     options: &str,
     context: &KinematicsContext,
-) -> Made<dyn Kinematics> {
+) -> PluginResult<dyn Kinematics> {
     Ok(Box::new(Linked(Calls::make(
         table, name, options, context,
     )?)))

@@ -10,8 +10,8 @@ use super::entry::{DONE, FAILED, choice};
 use super::layout::{Choice, table};
 use super::watch::{Method, beat, calling};
 use crate::{
-    Accepted, Advanced, AxisVector, Block, BlockReport, Curve, Edge, LimitedBy, Made, Planner,
-    PlannerContext, PlannerDescription, PluginError, Segment, SegmentSink,
+    Accepted, Advanced, AxisVector, Block, BlockReport, Curve, Edge, LimitedBy, Planner,
+    PlannerContext, PlannerDescription, PluginError, PluginResult, Segment, SegmentSink,
 };
 
 contract! {
@@ -138,7 +138,7 @@ pub fn open(
     name: &'static str,
     options: &str,
     context: &PlannerContext,
-) -> Made<dyn Planner> {
+) -> PluginResult<dyn Planner> {
     Ok(Box::new(Linked(Calls::make(
         table, name, options, context,
     )?)))

@@ -5,8 +5,8 @@ use super::entry::{self, foreign};
 use super::layout::layout;
 use super::watch::Method;
 use crate::{
-    Answer, FeedStrategy, MAX_SIGNALS, Made, PluginError, Request, Slice, StrategyContext, Window,
-    Words,
+    Answer, FeedStrategy, MAX_SIGNALS, PluginError, PluginResult, Request, Slice, StrategyContext,
+    Window, Words,
 };
 
 contract! {
@@ -121,7 +121,7 @@ pub fn open(
     name: &'static str,
     options: &str,
     context: &StrategyContext,
-) -> Made<dyn FeedStrategy> {
+) -> PluginResult<dyn FeedStrategy> {
     let calls = Calls::make(table, name, options, context)?;
     let named = calls.signals()?;
     let max_ratio_change_per_s = calls.max_ratio_change_per_s()?;

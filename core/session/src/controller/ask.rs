@@ -237,8 +237,8 @@ impl Dispatcher {
     }
 
     fn show_tables(&self) -> Value {
-        let lasting = lock(&self.lines).standing().lasting();
-        described::tables(&self.machine, &lasting)
+        let persistent = lock(&self.lines).standing().persistent_data();
+        described::tables(&self.machine, &persistent)
     }
 
     fn show_path(&self, asked: &Asked) -> Value {

@@ -1,7 +1,7 @@
 //! What a client has to know of the machine before it can show it: axes with their limits, and what lasts, as tables.
 
 use serde_json::{Map, Value, json};
-use tandem_gcode::{Lasting, WORK_SYSTEMS, system_code};
+use tandem_gcode::{PersistentData, WORK_SYSTEMS, system_code};
 use tandem_host::JobOutcome;
 use tandem_machine::Machine;
 
@@ -97,15 +97,15 @@ pub fn machine(machine: &Machine) -> Value {
 }
 
 /// Work offsets and tools, all of them. Allocates.
-pub fn tables(machine: &Machine, lasting: &Lasting) -> Value {
+pub fn tables(machine: &Machine, persistent: &PersistentData) -> Value {
     let axes = &machine.axes;
     let offsets: Map<String, Value> = (0..WORK_SYSTEMS)
         .map(|system| {
-            let origin = Position::new(axes, &lasting.origins[system]);
+            let origin = Position::new(axes, &persistent.origins[system]);
             (system_code(system), json!(origin))
         })
         .collect();
-    let tools: Vec<Value> = lasting
+    let tools: Vec<Value> = persistent
         .tools
         .iter()
         .map(|tool| {

@@ -12,7 +12,7 @@ use std::time::SystemTime;
 
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
-use tandem_gcode::Lasting;
+use tandem_gcode::PersistentData;
 use tandem_host::JobOutcome;
 use tandem_machine::Machine;
 use tandem_rings::{MachineState, Status, Switched};
@@ -293,7 +293,7 @@ pub struct Dispatcher {
     seen: Mutex<Seen>,
     frames: Mutex<Vec<(u64, String)>>,
     /// What lasts, as it was last made persistent.
-    kept: Mutex<Option<Lasting>>,
+    kept: Mutex<Option<PersistentData>>,
     /// On the virtual clock the time, ms; below zero where the computer's clock says.
     replay_ms: AtomicI64,
     post: Mutex<Vec<(Option<u64>, String)>>,
@@ -401,19 +401,19 @@ impl Dispatcher {
     pub fn keep_reached(&self) {
         let mut lines = lock(&self.lines);
         if lines.settle() {
-            let lasting = lines.standing().lasting();
+            let persistent = lines.standing().persistent_data();
             drop(lines);
-            self.keep(lasting);
+            self.keep(persistent);
         }
     }
 
     /// Keeps what lasts, where it is otherwise than before.
-    pub fn keep(&self, lasting: Lasting) {
+    pub fn keep(&self, persistent: PersistentData) {
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
-        if kept.as_ref() != Some(&lasting) {
+        if kept.as_ref() != Some(&persistent) {
             self.persistence
-                .record(Change::Program(Arc::new(lasting.clone())));
-            *kept = Some(lasting);
+                .record(Change::Program(Arc::new(persistent.clone())));
+            *kept = Some(persistent);
         }
     }
 
@@ -608,8 +608,8 @@ impl Dispatcher {
             !whole && !let_go,
         );
         self.tell_driven(&driven, whole);
-        let lasting = lock(&self.lines).standing().lasting();
-        self.keep(lasting);
+        let persistent = lock(&self.lines).standing().persistent_data();
+        self.keep(persistent);
         self.persistence
             .record(Change::LastPosition(outcome.position));
         self.hub.stands_at(&outcome.position);

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use tandem_gcode::{Interpreter, Item, Lasting, Ledger, Moment, ProbeResult};
+use tandem_gcode::{Interpreter, Item, PersistentData, ProbeResult, StateTag, StateTags};
 use tandem_machine::Machine;
 use tandem_rings::{Rest, RestCause};
 use tandem_rough::Source;
@@ -42,9 +42,9 @@ pub struct Lines {
     standing: Interpreter,
     /// The same behind the last line that was judged.
     ahead: Interpreter,
-    told: Option<Moment>,
+    told: Option<StateTag>,
     /// What programs and lines change, until the path reaches it.
-    pub ledger: Ledger,
+    pub state_tags: StateTags,
     waiting: VecDeque<Vec<Item>>,
     judged: VecDeque<Judged>,
     count: u32,
@@ -150,7 +150,7 @@ impl Lines {
             ahead: standing.clone(),
             standing,
             told: None,
-            ledger: Ledger::default(),
+            state_tags: StateTags::default(),
             waiting: VecDeque::new(),
             judged: VecDeque::new(),
             count: 0,
@@ -205,7 +205,7 @@ impl Lines {
         self.waiting.clear();
         self.asks &= self.driving;
         if !self.driving {
-            self.ledger.forget();
+            self.state_tags.forget();
             self.ahead = self.standing.clone();
         }
         forgotten.into()
@@ -246,9 +246,9 @@ impl Lines {
     }
 
     /// What lasts is otherwise from here on; nothing is driven.
-    pub fn set_lasting(&mut self, lasting: &Lasting) {
+    pub fn set_persistent_data(&mut self, persistent: &PersistentData) {
         self.turn += 1;
-        self.standing.set_lasting(lasting);
+        self.standing.set_persistent_data(persistent);
         self.ahead = self.standing.clone();
     }
 
@@ -256,13 +256,13 @@ impl Lines {
     ///
     /// # Errors
     /// What is wrong with the line.
-    pub fn lasting_behind(&self, line: &str) -> Result<Lasting, String> {
+    pub fn persistent_data_behind(&self, line: &str) -> Result<PersistentData, String> {
         let mut tried = self.standing.clone();
         tried.reset_modes();
         tried
             .line(1, line.as_bytes(), &mut vec![])
             .map_err(|e| e.message)?;
-        Ok(tried.lasting())
+        Ok(tried.persistent_data())
     }
 
     /// Judges a line and takes it.
@@ -362,8 +362,8 @@ impl Lines {
         }
         let begins = self.prepare()?;
         let mut before = self.ahead.clone();
-        before.keep_moments();
-        let modes = before.moment_since(&mut None);
+        before.keep_state_tags();
+        let modes = before.state_tag_since(&mut None);
         let first_block = before.next_block();
         let text = format!("G94 G1 {words}");
         let mut judged = self.judge.judge(&before, self.count + 1, &text)?;
@@ -392,7 +392,7 @@ impl Lines {
         if begins {
             self.ahead = self.standing.clone();
             self.ahead.number_anew();
-            self.ahead.keep_moments();
+            self.ahead.keep_state_tags();
             self.count = 0;
             self.told = None;
         }
@@ -422,8 +422,8 @@ impl Lines {
         self.asks = items
             .iter()
             .any(|item| matches!(item, Item::Wait(_)) || item.is_probe());
-        if let Some(moment) = tried.moment_since(&mut self.told) {
-            self.ledger.push(first_block, moment);
+        if let Some(tag) = tried.state_tag_since(&mut self.told) {
+            self.state_tags.push(first_block, tag);
         }
         self.ahead = tried;
         self.count += 1;
@@ -448,7 +448,7 @@ impl Lines {
         if alone {
             self.waiting.clear();
             self.judged.clear();
-            self.ledger.reach_all();
+            self.state_tags.reach_all();
             self.settle();
         }
         alone
@@ -466,7 +466,7 @@ impl Lines {
 
     /// The path has begun `block`: lines that are driven by now.
     pub fn reach(&mut self, block: u64) -> Vec<Judged> {
-        self.ledger.reach(block);
+        self.state_tags.reach(block);
         let driven = self
             .judged
             .iter()
@@ -477,10 +477,10 @@ impl Lines {
 
     /// Takes up what the path has reached since; whether that is anything.
     pub fn settle(&mut self) -> bool {
-        let reached = self.ledger.take();
+        let reached = self.state_tags.take();
         let is_any = reached.is_some();
-        if let Some(moment) = reached {
-            self.standing.take_up(moment);
+        if let Some(tag) = reached {
+            self.standing.take_up(tag);
         }
         is_any
     }
@@ -498,9 +498,9 @@ impl Lines {
         self.turn += 1;
         let goes_on = whole && !self.waiting.is_empty();
         if whole && !goes_on {
-            self.ledger.reach_all();
+            self.state_tags.reach_all();
         } else if !whole {
-            self.ledger.forget();
+            self.state_tags.forget();
             self.waiting.clear();
         }
         self.settle();

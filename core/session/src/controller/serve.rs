@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Mutex};
 
 use serde_json::{Value, json};
-use tandem_gcode::{Interpreter, Lasting, Program};
+use tandem_gcode::{Interpreter, PersistentData, Program};
 use tandem_host::{
     Clock, HostError, JobOutcome, Memory, PolicyParameter, PreparedJob, Registry, Resident,
     RunObserver, Switches, axis_limits, interpreter_config, moves_metal, planner,
@@ -47,7 +47,7 @@ pub struct Options {
     /// Fine periods that are counted before the first.
     pub uptime_periods: u64,
     /// What has lasted from the process before; none where the machine file alone says.
-    pub lasting: Option<Lasting>,
+    pub persistent: Option<PersistentData>,
 }
 
 impl Options {
@@ -62,7 +62,7 @@ impl Options {
             enable: true,
             script,
             uptime_periods: 0,
-            lasting: None,
+            persistent: None,
         }
     }
 }
@@ -94,7 +94,7 @@ impl<'r> Controller<'r> {
         let mut resident = Resident::attach(machine.clone(), registry, options.clock)?;
         resident.begin_at(options.uptime_periods);
         let machine = resident.machine().clone();
-        let interpreter = interpreter_of(&machine, simulated, options.lasting);
+        let interpreter = interpreter_of(&machine, simulated, options.persistent);
         let mut dispatcher = dispatcher_of(
             &resident,
             registry,
@@ -185,8 +185,8 @@ impl<'r> Controller<'r> {
             tell,
         );
         self.resident.stop(&mut Notes(tell))?;
-        let lasting = lock(&self.dispatcher.lines).standing().lasting();
-        self.dispatcher.keep(lasting);
+        let persistent = lock(&self.dispatcher.lines).standing().persistent_data();
+        self.dispatcher.keep(persistent);
         drop(self.server);
         disk_work::wait_for_all(&self.dispatcher);
         if let Some(records) = &self.records {
@@ -293,8 +293,8 @@ impl<'r> Controller<'r> {
     fn memory(&self) -> Memory {
         let lines = lock(&self.dispatcher.lines);
         Memory {
-            lasting: Arc::new(lines.standing().lasting()),
-            ledger: lines.ledger.clone(),
+            persistent: Arc::new(lines.standing().persistent_data()),
+            state_tags: lines.state_tags.clone(),
             on: lines.standing().switched_on(),
         }
     }
@@ -524,11 +524,15 @@ impl<'r> Controller<'r> {
 }
 
 /// The interpreter of lines by hand, with what has lasted from the process before.
-fn interpreter_of(machine: &Machine, simulated: bool, lasting: Option<Lasting>) -> Interpreter {
+fn interpreter_of(
+    machine: &Machine,
+    simulated: bool,
+    persistent: Option<PersistentData>,
+) -> Interpreter {
     let mut config = interpreter_config(machine, simulated, Switches::default());
-    if let Some(lasting) = lasting {
-        config.tools.clone_from(&lasting.tools);
-        config.lasting = Some(Arc::new(lasting));
+    if let Some(persistent) = persistent {
+        config.tools.clone_from(&persistent.tools);
+        config.persistent = Some(Arc::new(persistent));
     }
     Interpreter::new(config)
 }

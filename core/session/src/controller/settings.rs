@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::sync::Arc;
 
 use serde_json::{Value, json};
-use tandem_gcode::{Lasting, Tool, system_code};
+use tandem_gcode::{PersistentData, Tool, system_code};
 use tandem_sdk::AxisVector;
 use tandem_state::Change;
 
@@ -28,7 +28,7 @@ impl Dispatcher {
             }
         }
         let mut changes = vec![];
-        let lasting = match name {
+        let persistent = match name {
             "touch-off" | "set-offset" => {
                 let system = match asked.with.get("system") {
                     None => 0,
@@ -47,42 +47,49 @@ impl Dispatcher {
                     ));
                 }
                 let number = if name == "touch-off" { 20 } else { 2 };
-                lines.lasting_behind(&format!("G10 L{number} P{system}{words}"))?
+                lines.persistent_data_behind(&format!("G10 L{number} P{system}{words}"))?
             }
             "set-parameter" => {
                 let (number, value) = (asked.number("number")?, asked.number("value")?);
                 if !(31.0..=5000.0).contains(&number) || number.fract() != 0.0 {
                     return Err("a parameter that lasts has a number from 31 to 5000".to_string());
                 }
-                let mut lasting = lines.standing().lasting();
-                lasting.parameters.insert(number as u32, value);
+                let mut persistent = lines.standing().persistent_data();
+                persistent.parameters.insert(number as u32, value);
                 // Beside those that last by themselves, those that somebody has set by hand do.
                 changes.push(Change::ListParameter {
                     number: number as usize,
                     value,
                 });
-                lasting
+                persistent
             }
-            _ => self.with_tool(lines.standing().lasting(), asked)?,
+            _ => self.with_tool(lines.standing().persistent_data(), asked)?,
         };
-        changes.push(Change::Program(Arc::new(lasting.clone())));
+        changes.push(Change::Program(Arc::new(persistent.clone())));
         // Nothing else changes meanwhile what lasts: nothing is driven, and nothing is begun.
         drop(lines);
         self.persistence.commit(changes)?;
-        lock(&self.lines).set_lasting(&lasting);
+        lock(&self.lines).set_persistent_data(&persistent);
         Ok(json!({ "set": name }))
     }
 
-    fn with_tool(&self, mut lasting: Lasting, asked: &Asked) -> Result<Lasting, String> {
+    fn with_tool(
+        &self,
+        mut persistent: PersistentData,
+        asked: &Asked,
+    ) -> Result<PersistentData, String> {
         let number = asked.number("number")?;
         if !(0.0..=99_999.0).contains(&number) || number.fract() != 0.0 {
             return Err("a tool has a number from 1 to 99999; 0 is the empty spindle".to_string());
         }
         let number = number as u32;
         if asked.is_on("in_spindle") {
-            lasting.tool_in_spindle = number;
+            persistent.tool_in_spindle = number;
         }
-        let at = lasting.tools.iter().position(|tool| tool.number == number);
+        let at = persistent
+            .tools
+            .iter()
+            .position(|tool| tool.number == number);
         let mut tool = at.map_or(
             Tool {
                 number,
@@ -90,7 +97,7 @@ impl Dispatcher {
                 offset: AxisVector::ZERO,
                 diameter_mm: 0.0,
             },
-            |at| lasting.tools[at],
+            |at| persistent.tools[at],
         );
         for axis in 0..self.machine.axes.count() {
             if let Some(value) = asked.number_if_any(&self.axis_key(axis))? {
@@ -106,10 +113,10 @@ impl Dispatcher {
         }
         match at {
             _ if number == 0 => {}
-            Some(at) => lasting.tools[at] = tool,
-            None => lasting.tools.push(tool),
+            Some(at) => persistent.tools[at] = tool,
+            None => persistent.tools.push(tool),
         }
-        Ok(lasting)
+        Ok(persistent)
     }
 
     /// The key of an axis, such as `x_mm` or `a_deg`.

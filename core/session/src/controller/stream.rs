@@ -119,7 +119,7 @@ impl Dispatcher {
     fn begin_for_line(&self, inner: &mut Inner, lines: &mut Lines, taken: TakenLine) {
         if taken.begins && inner.mode == Mode::Idle {
             if lines.take_up_at_rest() {
-                self.keep(lines.standing().lasting());
+                self.keep(lines.standing().persistent_data());
             } else {
                 inner.order = Some(Order::Mdi);
             }

@@ -346,21 +346,21 @@ pub fn modes(ahead: &Interpreter, inches: bool) -> String {
 /// `$#`: offsets, and what the last probe found.
 pub fn offsets(dispatcher: &Dispatcher, inches: bool) -> String {
     let axes = &dispatcher.machine.axes;
-    let (lasting, probed) =
-        dispatcher.with_lines(|lines| (lines.ahead().lasting(), lines.probed()));
+    let (persistent, probed) =
+        dispatcher.with_lines(|lines| (lines.ahead().persistent_data(), lines.probed()));
     let mut text = String::new();
     let mut line = |name: &str, of: &AxisVector, more: &str| {
         let _ = write!(text, "[{name}:{}{more}]\r\n", vector(axes, of, inches));
     };
-    for (index, origin) in lasting.origins.iter().enumerate() {
+    for (index, origin) in persistent.origins.iter().enumerate() {
         line(&system_code(index), origin, "");
     }
-    line("G28", &lasting.reference[0], "");
-    line("G30", &lasting.reference[1], "");
-    line("G92", &lasting.g92, "");
+    line("G28", &persistent.reference[0], "");
+    line("G30", &persistent.reference[1], "");
+    line("G92", &persistent.g92, "");
     let found = probed.map_or(AxisVector::ZERO, |probed| probed.position);
     let touched = u8::from(probed.is_some_and(|probed| probed.touched));
-    let tool = axes.index('Z').map_or(0.0, |z| lasting.tool_offset[z]);
+    let tool = axes.index('Z').map_or(0.0, |z| persistent.tool_offset[z]);
     let _ = write!(text, "[TLO:{}]\r\n", length(tool, inches));
     let _ = write!(text, "[PRB:{}:{touched}]\r\n", vector(axes, &found, inches));
     text

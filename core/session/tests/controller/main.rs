@@ -168,11 +168,11 @@ fn a_day_at_the_machine_in_one_process() {
     let kept = kept.0.lock().unwrap();
     let parameters: Vec<_> = kept
         .iter()
-        .map(|lasting| lasting.parameters.get(&100).copied())
+        .map(|persistent| persistent.parameters.get(&100).copied())
         .collect();
     let after_abort = kept
         .iter()
-        .find(|lasting| lasting.parameters.get(&100) == Some(&2.0))
+        .find(|persistent| persistent.parameters.get(&100) == Some(&2.0))
         .unwrap();
     assert_eq!(after_abort.origins[1][0], 0.0, "{parameters:?}");
     assert_eq!(kept.last().unwrap().origins[1][0], 77.0);

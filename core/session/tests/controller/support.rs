@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
 use serde_json::{Value, json};
-use tandem_gcode::Lasting;
+use tandem_gcode::PersistentData;
 use tandem_host::Registry;
 use tandem_machine::Machine;
 use tandem_session::controller::{Controller, Options, Persistence, ScriptLine};
@@ -139,7 +139,10 @@ impl Told {
 
 /// Keeps what it is given: what lasts, and all of it.
 #[derive(Clone, Default)]
-pub struct Kept(pub Arc<Mutex<Vec<Lasting>>>, pub Arc<Mutex<Vec<Change>>>);
+pub struct Kept(
+    pub Arc<Mutex<Vec<PersistentData>>>,
+    pub Arc<Mutex<Vec<Change>>>,
+);
 
 impl Persistence for Kept {
     fn commit(&self, changes: Vec<Change>) -> Result<(), String> {
@@ -150,8 +153,11 @@ impl Persistence for Kept {
     }
 
     fn record(&self, change: Change) {
-        if let Change::Program(lasting) = &change {
-            self.0.lock().unwrap().push(Lasting::clone(lasting));
+        if let Change::Program(persistent) = &change {
+            self.0
+                .lock()
+                .unwrap()
+                .push(PersistentData::clone(persistent));
         }
         self.1.lock().unwrap().push(change);
     }

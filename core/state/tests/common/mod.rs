@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use tandem_rig::Random;
 use tandem_sdk::{Axes, AxisVector, MAX_AXES};
-use tandem_state::{Change, LastingState, Owner, Tool, ToolLife, WorkOffsets};
+use tandem_state::{Change, Owner, PersistentState, Tool, ToolLife, WorkOffsets};
 
 pub fn axes() -> Axes {
     Axes::new(&[('X', false), ('Y', false), ('Z', false), ('A', true)]).unwrap()
@@ -22,7 +22,7 @@ pub fn all_say(n: u64) -> Vec<Change> {
         diameter_mm: value,
         ..Tool::default()
     };
-    let mut state = LastingState::default();
+    let mut state = PersistentState::default();
     state.offsets.origins[0] = same;
     state.offsets.rotations_rad[0] = value;
     state.parameters = [(100, value), (500, value), (999, value)].into();
@@ -30,7 +30,7 @@ pub fn all_say(n: u64) -> Vec<Change> {
 }
 
 /// That programs see `state`.
-pub fn change(state: &LastingState) -> Change {
+pub fn change(state: &PersistentState) -> Change {
     Change::Program(Arc::new(state.to_program(&AxisVector::ZERO)))
 }
 
@@ -51,7 +51,7 @@ pub fn recorded(n: u64) -> Change {
 }
 
 /// What all rows say; none where they do not say the same.
-pub fn said(state: &LastingState) -> Option<u64> {
+pub fn said(state: &PersistentState) -> Option<u64> {
     let value = state.parameters.get(&500).copied().unwrap_or(0.0);
     let same = AxisVector::from_slice(&[value; 4]);
     let tool = state.tools.get(&7).cloned().unwrap_or_default();
@@ -105,8 +105,8 @@ pub fn any_tool(random: &mut Random, axes: &Axes, number: u32) -> Tool {
     }
 }
 
-pub fn any_state(random: &mut Random, axes: &Axes) -> LastingState {
-    let mut state = LastingState {
+pub fn any_state(random: &mut Random, axes: &Axes) -> PersistentState {
+    let mut state = PersistentState {
         offsets: WorkOffsets {
             origins: std::array::from_fn(|_| any_vector(random, axes)),
             rotations_rad: std::array::from_fn(|_| random.unit() - 0.5),
@@ -117,7 +117,7 @@ pub fn any_state(random: &mut Random, axes: &Axes) -> LastingState {
         reference: std::array::from_fn(|_| (random.unit() < 0.5).then(|| any_vector(random, axes))),
         tool_in_spindle: random.below(100_000) as u32,
         last_position: (random.unit() < 0.5).then(|| any_vector(random, axes)),
-        ..LastingState::default()
+        ..PersistentState::default()
     };
     for _ in 0..random.below(20) {
         state

@@ -12,7 +12,7 @@ mod trouble;
 pub use description::{Cut, DriveDescription};
 pub(crate) use objects::{default_pdos, judge_write};
 pub use state::DriveState;
-pub(crate) use trouble::{Lasting, Trouble};
+pub(crate) use trouble::{Condition, Trouble};
 
 use crate::firmware::dictionary::Dictionary;
 use axis::{Axis, Power};
@@ -304,11 +304,11 @@ impl Drive {
     }
 
     fn take_troubles(&mut self, dictionary: &mut Dictionary) {
-        self.axis.blocked = self.trouble.has(Lasting::Blocked);
+        self.axis.blocked = self.trouble.has(Condition::Blocked);
         if let Some(code) = self.trouble.fault.take() {
             self.fail(code, dictionary);
         }
-        let safe = self.trouble.has(Lasting::TorqueOff)
+        let safe = self.trouble.has(Condition::TorqueOff)
             && !matches!(self.state, DriveState::Fault | DriveState::NotReady);
         if safe || std::mem::take(&mut self.trouble.disable) {
             self.switch_off();
@@ -320,20 +320,20 @@ impl Drive {
         use DriveState as State;
         let command = Command::of(control);
         let reset = control & !self.last_control & 0x80 != 0;
-        let able = !self.trouble.has(Lasting::TorqueOff);
+        let able = !self.trouble.has(Condition::TorqueOff);
         self.state = match (self.state, command) {
             (State::NotReady, _)
             | (State::ReadyToSwitchOn | State::SwitchedOn, DisableVoltage | QuickStop) => {
                 State::SwitchOnDisabled
             }
-            (State::Fault, _) if reset && !self.trouble.has(Lasting::FaultStays) => {
+            (State::Fault, _) if reset && !self.trouble.has(Condition::FaultStays) => {
                 dictionary.set(self.slots.error_code, 0);
                 State::SwitchOnDisabled
             }
             (State::SwitchOnDisabled, Shutdown) if able => State::ReadyToSwitchOn,
             (State::ReadyToSwitchOn, SwitchOn | EnableOperation) => State::SwitchedOn,
             (State::SwitchedOn, Shutdown) => State::ReadyToSwitchOn,
-            (State::SwitchedOn, EnableOperation) if !self.trouble.has(Lasting::NeverEnables) => {
+            (State::SwitchedOn, EnableOperation) if !self.trouble.has(Condition::NeverEnables) => {
                 self.enable()
             }
             (State::OperationEnabled | State::QuickStopActive, DisableVoltage) => {
@@ -401,7 +401,7 @@ impl Drive {
     fn power(&mut self) -> Power {
         use DriveState as State;
         match self.state {
-            _ if self.trouble.has(Lasting::TorqueOff) => Power::Brake,
+            _ if self.trouble.has(Condition::TorqueOff) => Power::Brake,
             State::OperationEnabled | State::QuickStopActive | State::FaultReactionActive => {
                 self.brake_s = self.of.brake_close_ms / 1000.0;
                 Power::Motor

@@ -2,7 +2,7 @@
 
 use super::homing::{Homing, Step, Switches};
 use super::objects::HOMING_SPEEDS;
-use super::{Course, Drive, DriveState, FOLLOWING_ERROR, Lasting, REST_COUNTS_PER_S, STEP_S};
+use super::{Condition, Course, Drive, DriveState, FOLLOWING_ERROR, REST_COUNTS_PER_S, STEP_S};
 use crate::firmware::dictionary::Dictionary;
 
 /// Bits of the status word: voltage, led by the bus, target reached; by mode: follows or attained, error.
@@ -222,7 +222,7 @@ impl Drive {
 
     fn status(&self) -> u16 {
         let mut status = self.state.bits() | REMOTE;
-        if !self.trouble.has(Lasting::TorqueOff) {
+        if !self.trouble.has(Condition::TorqueOff) {
             status |= VOLTAGE;
         }
         let enabled = self.state == DriveState::OperationEnabled && self.stop.is_none();

@@ -11,12 +11,12 @@ pub(crate) struct Trouble {
     pub(crate) mode_shown: Option<i8>,
     /// Time until the brake is open, in ms.
     pub(crate) brake_ms: Option<f64>,
-    lasting: Vec<Lasting>,
+    conditions: Vec<Condition>,
 }
 
 /// A trouble that is there or not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Lasting {
+pub(crate) enum Condition {
     /// A reset does not help.
     FaultStays,
     /// It never gets beyond *Switched on*.
@@ -28,14 +28,14 @@ pub(crate) enum Lasting {
 }
 
 impl Trouble {
-    pub(crate) fn has(&self, trouble: Lasting) -> bool {
-        self.lasting.contains(&trouble)
+    pub(crate) fn has(&self, trouble: Condition) -> bool {
+        self.conditions.contains(&trouble)
     }
 
-    pub(crate) fn set(&mut self, trouble: Lasting, on: bool) {
-        self.lasting.retain(|other| *other != trouble);
+    pub(crate) fn set(&mut self, trouble: Condition, on: bool) {
+        self.conditions.retain(|other| *other != trouble);
         if on {
-            self.lasting.push(trouble);
+            self.conditions.push(trouble);
         }
     }
 }

@@ -73,7 +73,7 @@ fn changes_nothing(line: &Line, tenths: u16, group: Group) -> bool {
                 }
         }
         Group::CoordinateSystem => {
-            crate::lasting::system_code(line.state.coordinates.active())
+            crate::persistent::system_code(line.state.coordinates.active())
                 == crate::words::written('G', tenths)
         }
         _ => false,

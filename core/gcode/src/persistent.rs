@@ -17,9 +17,9 @@ use crate::words::spindle::Spindle;
 pub const WORK_SYSTEMS: usize = SYSTEMS;
 
 /// What lasts from one program to the next, as plain data: vectors in mm or rad, machine coordinates. An interpreter begins with
-/// it ([`crate::Config::lasting`]) and says it at any time ([`Interpreter::lasting`]).
+/// it ([`crate::Config::persistent_data`]) and says it at any time ([`Interpreter::persistent_data`]).
 #[derive(Clone, Debug, PartialEq)]
-pub struct Lasting {
+pub struct PersistentData {
     /// Origins of the work coordinate systems, G54 first.
     pub origins: [AxisVector; WORK_SYSTEMS],
     /// Rotation of each about its origin, from X to Y, rad.
@@ -42,7 +42,7 @@ pub struct Lasting {
     pub tool_in_spindle: u32,
 }
 
-impl Default for Lasting {
+impl Default for PersistentData {
     /// No offset, no parameter, no tool; G54 in force.
     fn default() -> Self {
         let zero = AxisVector::ZERO;
@@ -61,7 +61,7 @@ impl Default for Lasting {
     }
 }
 
-/// What is in force of the tables of [`Lasting`], by itself: for whoever shows it many times a second.
+/// What is in force of the tables of [`PersistentData`], by itself: for whoever shows it many times a second.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InForce {
     /// Index of the work coordinate system: 0 for G54.
@@ -78,27 +78,27 @@ pub struct InForce {
 
 /// Modes, offsets, tools and parameters as they are from a place of the path on.
 #[derive(Clone)]
-pub struct Moment {
+pub struct StateTag {
     state: Box<State>,
     written: Vec<Written>,
 }
 
-/// What lines have changed that are read ahead of the path, until the path reaches them. The side that reads and the side that
+/// The tags of lines that are read ahead of the path, until the path reaches them. The side that reads and the side that
 /// sees samples share it; soft side, allocates.
 #[derive(Clone, Default)]
-pub struct Ledger(Arc<Mutex<Inner>>);
+pub struct StateTags(Arc<Mutex<Inner>>);
 
 #[derive(Default)]
 struct Inner {
     /// Each with the block at which the path reaches it.
-    waiting: VecDeque<(u64, Moment)>,
-    reached: Option<Moment>,
+    waiting: VecDeque<(u64, StateTag)>,
+    reached: Option<StateTag>,
 }
 
-impl Ledger {
-    /// A line behind which things are as `moment` says counts once the path has begun `block`.
-    pub fn push(&self, block: u64, moment: Moment) {
-        self.lock().waiting.push_back((block, moment));
+impl StateTags {
+    /// A line behind which things are as `tag` says counts once the path has begun `block`.
+    pub fn push(&self, block: u64, tag: StateTag) {
+        self.lock().waiting.push_back((block, tag));
     }
 
     /// The path has begun `block`.
@@ -123,7 +123,7 @@ impl Ledger {
     }
 
     /// What the path has reached since this was asked last.
-    pub fn take(&self) -> Option<Moment> {
+    pub fn take(&self) -> Option<StateTag> {
         self.lock().reached.take()
     }
 
@@ -135,28 +135,28 @@ impl Ledger {
 
 impl Inner {
     fn take_next(&mut self) {
-        let Some((_, moment)) = self.waiting.pop_front() else {
+        let Some((_, tag)) = self.waiting.pop_front() else {
             return;
         };
         match &mut self.reached {
             Some(reached) => {
-                reached.written.extend(moment.written);
-                reached.state = moment.state;
+                reached.written.extend(tag.written);
+                reached.state = tag.state;
             }
-            None => self.reached = Some(moment),
+            None => self.reached = Some(tag),
         }
     }
 }
 
 impl Interpreter {
     /// What would outlive the program if it ended here. Allocates.
-    pub fn lasting(&self) -> Lasting {
-        let mut lasting = Lasting::default();
-        self.state.coordinates.tell(&mut lasting);
-        lasting.parameters = self.parameters.lasting();
-        lasting.tools.clone_from(self.state.tools.table());
-        lasting.tool_in_spindle = self.state.tools.in_spindle;
-        lasting
+    pub fn persistent_data(&self) -> PersistentData {
+        let mut persistent = PersistentData::default();
+        self.state.coordinates.tell(&mut persistent);
+        persistent.parameters = self.parameters.persistent_data();
+        persistent.tools.clone_from(self.state.tools.table());
+        persistent.tool_in_spindle = self.state.tools.in_spindle;
+        persistent
     }
 
     /// What is in force of it now. Does not allocate.
@@ -172,22 +172,22 @@ impl Interpreter {
     }
 
     /// Takes offsets, parameters and tools as they are said here; modes stay. At rest; allocates.
-    pub fn set_lasting(&mut self, lasting: &Lasting) {
-        self.state.coordinates.hear(lasting);
-        self.parameters.set_lasting(&lasting.parameters);
+    pub fn set_persistent_data(&mut self, persistent: &PersistentData) {
+        self.state.coordinates.hear(persistent);
+        self.parameters.set_persistent_data(&persistent.parameters);
         self.state
             .tools
-            .set_table(&lasting.tools, lasting.tool_in_spindle);
+            .set_table(&persistent.tools, persistent.tool_in_spindle);
     }
 
-    /// From here on what lines write is kept, to be told by [`Interpreter::moment_since`].
-    pub fn keep_moments(&mut self) {
+    /// From here on what lines write is kept, to be told by [`Interpreter::state_tag_since`].
+    pub fn keep_state_tags(&mut self) {
         self.parameters.keep_log();
     }
 
-    /// How things are behind the last line, where they are otherwise than at `before`, which is then this moment. Allocates where
+    /// How things are behind the last line, where they are otherwise than at `before`, which is then this one. Allocates where
     /// something has changed.
-    pub fn moment_since(&mut self, before: &mut Option<Moment>) -> Option<Moment> {
+    pub fn state_tag_since(&mut self, before: &mut Option<StateTag>) -> Option<StateTag> {
         let written = self.parameters.take_log();
         let same = before
             .as_ref()
@@ -195,15 +195,15 @@ impl Interpreter {
         if same && written.is_empty() {
             return None;
         }
-        let moment = Moment {
+        let tag = StateTag {
             state: Box::new(self.state.clone()),
             written,
         };
-        *before = Some(Moment {
-            state: moment.state.clone(),
+        *before = Some(StateTag {
+            state: tag.state.clone(),
             written: vec![],
         });
-        Some(moment)
+        Some(tag)
     }
 
     /// Number of the block that comes next.
@@ -216,10 +216,10 @@ impl Interpreter {
         self.state.path.next_index = 0;
     }
 
-    /// Modes, offsets, tools and parameters are as a program has left them at `moment`; where the machine stands is said by
+    /// Modes, offsets, tools and parameters are as a program has left them at `tag`; where the machine stands is said by
     /// [`Interpreter::set_position`]. Allocates.
-    pub fn take_up(&mut self, moment: Moment) {
-        let Moment { mut state, written } = moment;
+    pub fn take_up(&mut self, tag: StateTag) {
+        let StateTag { mut state, written } = tag;
         std::mem::swap(&mut state.path, &mut self.state.path);
         state.curves = crate::words::curve::Curves::default();
         state.compensation = crate::words::compensation::Compensation::default();
@@ -359,17 +359,20 @@ mod tests {
             "G10 L1 P2 Z12",
         ];
         let first = interpreter(&mill(), &lines);
-        let lasting = first.lasting();
-        assert_eq!((lasting.active_system, lasting.tool_in_spindle), (1, 2));
+        let persistent = first.persistent_data();
         assert_eq!(
-            lasting.parameters,
+            (persistent.active_system, persistent.tool_in_spindle),
+            (1, 2)
+        );
+        assert_eq!(
+            persistent.parameters,
             BTreeMap::from([(100, 7.0), (4999, -2.5)]),
             "#5 dies with its program"
         );
         let mut config = mill();
-        config.lasting = Some(Arc::new(lasting.clone()));
+        config.persistent = Some(Arc::new(persistent.clone()));
         let second = Interpreter::new(config);
-        assert_eq!(second.lasting(), lasting);
+        assert_eq!(second.persistent_data(), persistent);
         let place = AxisVector::from_slice(&[1.0, 2.0, 3.0]);
         assert_eq!(
             second.to_program(&place),
@@ -380,9 +383,9 @@ mod tests {
 
     #[test]
     fn only_what_the_path_has_reached_counts() {
-        let (ledger, mut standing) = (Ledger::default(), interpreter(&mill(), &[]));
+        let (state_tags, mut standing) = (StateTags::default(), interpreter(&mill(), &[]));
         let mut ahead = standing.clone();
-        ahead.keep_moments();
+        ahead.keep_state_tags();
         let mut last = None;
         for (number, line) in (1..).zip([
             "G1 X1 F60",
@@ -394,16 +397,19 @@ mod tests {
         ]) {
             let before = ahead.next_block();
             ahead.line(number, line.as_bytes(), &mut vec![]).unwrap();
-            if let Some(moment) = ahead.moment_since(&mut last) {
-                ledger.push(before, moment);
+            if let Some(tag) = ahead.state_tag_since(&mut last) {
+                state_tags.push(before, tag);
             }
         }
-        ledger.reach(1);
-        ledger.forget();
-        standing.take_up(ledger.take().unwrap());
-        assert_eq!(standing.lasting().parameters, BTreeMap::from([(100, 1.0)]));
+        state_tags.reach(1);
+        state_tags.forget();
+        standing.take_up(state_tags.take().unwrap());
         assert_eq!(
-            standing.lasting().origins[0],
+            standing.persistent_data().parameters,
+            BTreeMap::from([(100, 1.0)])
+        );
+        assert_eq!(
+            standing.persistent_data().origins[0],
             AxisVector::ZERO,
             "the path did not come to line 4"
         );
@@ -415,6 +421,6 @@ mod tests {
         assert!(standing.modal_words().contains(&"G1".to_string()));
         standing.reset_modes();
         assert!(standing.modal_words().contains(&"G90".to_string()));
-        assert!(ledger.take().is_none());
+        assert!(state_tags.take().is_none());
     }
 }
