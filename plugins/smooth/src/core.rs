@@ -17,8 +17,10 @@ use crate::window::{Piece, Start, State, Window};
 const COMMIT: (f64, f64) = (0.42, 0.80);
 /// Speeds that count as equal when the place to leave is chosen.
 const EQUAL: f64 = 0.995;
-/// What a refused plan moves that place by, as a share of the window.
-const LATER: f64 = 0.1;
+/// What a refused plan moves that place by, as a share of the window. Behind the
+/// fastest place the window brakes for its rest, and what goes on from there has to build the speed up again: with twice as much one of
+/// 64 machines beside each other comes to rest on the path of two-step-arcs, with this and half of it none.
+const LATER: f64 = 0.05;
 /// Positions before a window that its check looks at.
 const BEFORE: usize = 16;
 /// A turn by more than this, as the size of the change of direction, ends a window that is cut short.

@@ -68,9 +68,6 @@ pub struct Smoother<const L: usize> {
     step: Vec<Lanes<L>>,
     /// 1/(h³·J) of each lane.
     scale: Lanes<L>,
-    /// How many intervals at the start jerk counts more in, and how much: there is a motion to go on from, and no rate to be
-    /// lowered.
-    pub firm: (usize, f64),
 }
 
 impl<const L: usize> Default for Smoother<L> {
@@ -80,7 +77,6 @@ impl<const L: usize> Default for Smoother<L> {
             matrix: Vec::new(),
             step: Vec::new(),
             scale: [0.0; L],
-            firm: (0, 1.0),
         }
     }
 }
@@ -192,8 +188,7 @@ impl<const L: usize> Smoother<L> {
         self.step.clear();
         self.step.resize(count, [0.0; L]);
         for k in 0..spline.intervals() {
-            let weight = if k < self.firm.0 { self.firm.1 } else { 1.0 };
-            self.assemble_jerk(k, control(spline, k), weight);
+            self.assemble_jerk(k, control(spline, k));
         }
         let mut violation = [0.0; L];
         for row in &mut self.rows {
@@ -234,16 +229,16 @@ impl<const L: usize> Smoother<L> {
 
     /// What the jerk of interval `k` adds: its form is (−1, 3, −3, 1).
     #[inline(always)]
-    fn assemble_jerk(&mut self, k: usize, c: &[Lanes<L>; 4], weight: f64) {
+    fn assemble_jerk(&mut self, k: usize, c: &[Lanes<L>; 4]) {
         const D: [f64; 4] = [-1.0, 3.0, -3.0, 1.0];
         let scale = &self.scale;
         let jerk: Lanes<L> = each(|l| (c[3][l] - c[0][l] + 3.0 * (c[1][l] - c[2][l])) * scale[l]);
         let bend: Lanes<L> = each(|l| {
-            (GENTLE + if jerk[l].abs() > CLOSING { weight } else { 0.0 }) * scale[l] * scale[l]
+            (GENTLE + if jerk[l].abs() > CLOSING { 1.0 } else { 0.0 }) * scale[l] * scale[l]
         });
         let slope: Lanes<L> = each(|l| {
             let over = larger(jerk[l] - HINGE, 0.0) + smaller(jerk[l] + HINGE, 0.0);
-            (GENTLE * jerk[l] + weight * over) * scale[l]
+            (GENTLE * jerk[l] + over) * scale[l]
         });
         let (rows, steps) = system(&mut self.matrix, &mut self.step, k);
         for i in 0..4 {

@@ -2,6 +2,7 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod neighbours;
 mod random;
 mod supply;
 mod times;

@@ -93,7 +93,7 @@ fn intervals_a_round(name: &str, grid_ms: f64, rounds: u32) -> f64 {
 
 #[test]
 fn rounds_before_the_last_take_a_coarser_grid_except_where_it_is_short() {
-    for (grid_ms, expected) in [(6.0, 0.6..0.85), (2.0, 0.94..1.06)] {
+    for (grid_ms, expected) in [(6.0, 0.8..0.92), (2.0, 0.94..1.06)] {
         let of = |rounds| intervals_a_round("serpentine", grid_ms, rounds);
         let share = of(4) / of(1);
         assert!(expected.contains(&share), "{grid_ms} ms: {share}");
