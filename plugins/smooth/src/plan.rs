@@ -80,7 +80,7 @@ const WIDE: Room = Room {
 /// What can be tuned.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tuning {
-    /// Step of the grid, s; zero where the path and the limits say it.
+    /// Step of the grid, s, where that is not coarser than the motion; zero where the path and the limits say it.
     pub step_s: f64,
     /// Time of a window, s.
     pub window_s: f64,
@@ -99,6 +99,9 @@ const STEP_SHARE: f64 = 0.76;
 const ROUND_S: f64 = 0.25e-3;
 /// Shortest and longest step that is taken by itself, s.
 const STEPS_S: (f64, f64) = (1.5e-3, 12e-3);
+/// Longest step that is taken where one is asked for, as a multiple of the one that is taken by itself: on a coarser grid the spline
+/// cannot follow the path at its speed, and comes to crawl.
+const MAX_COARSER: f64 = 2.0;
 /// Share of the most that acceleration adds between two samples that boxes leave room for, and the least share of them that is
 /// left: few motions use all of the acceleration across the path. Half of the second changes nothing; twice as much, which
 /// is beyond the tolerance, has windows refused and costs up to 2.4 % of the time.
@@ -111,13 +114,15 @@ impl Tuning {
     /// Step of the grid for a window whose least tolerance is `tolerance`, s: where none is stated, a share of the time in which
     /// an axis can go the tolerance at its limits, which is how long the motion takes around a feature of the path.
     fn step_s<const L: usize>(&self, frame: &Frame<L>, tolerance: f64) -> f64 {
-        if self.step_s > 0.0 {
-            return self.step_s;
-        }
         let by_jerk_s = (tolerance / frame.largest(&frame.jerk)).cbrt();
         let by_acceleration_s = (tolerance / frame.largest(&frame.acceleration)).sqrt();
         let step_s = STEP_SHARE * by_jerk_s.max(by_acceleration_s);
-        (ROUND_S * (step_s / ROUND_S).round()).clamp(STEPS_S.0, STEPS_S.1)
+        let step_s = (ROUND_S * (step_s / ROUND_S).round()).clamp(STEPS_S.0, STEPS_S.1);
+        if self.step_s > 0.0 {
+            self.step_s.min(MAX_COARSER * step_s)
+        } else {
+            step_s
+        }
     }
 
     /// Share of the boxes of such a window: what the motion does between two samples counts as much as how far these are off.
