@@ -161,6 +161,7 @@ fn spot(
             acceleration_mm_per_s2: leg.least.acceleration_mm_per_s2,
             jerk_mm_per_s3: leg.least.jerk_mm_per_s3,
         },
+        is_straight: leg.course.is_straight(),
         step_mm: step_mm.min(max_mm),
         knot_mm,
     }

@@ -15,6 +15,8 @@ pub struct Spot {
     pub speed_mm_per_s: f64,
     /// What axes leave along the path.
     pub tangential: Tangential,
+    /// The path is straight there: nothing but the speed itself is limited, and samples show whatever is above it.
+    pub is_straight: bool,
     /// Distance to the next place to be looked at, mm.
     pub step_mm: f64,
     /// Distance to the next place where the derivatives of the path may jump, mm: that is one to be looked at.
@@ -25,6 +27,8 @@ pub struct Spot {
 #[derive(Debug, Default)]
 pub struct Survey {
     pub places: Vec<Corner>,
+    /// At which of the places the path is straight.
+    straight: Vec<bool>,
     /// Both ends and the corners between them, in their order.
     pub corners: Vec<Corner>,
     /// Highest speed anywhere, mm/s.
@@ -63,6 +67,14 @@ impl Survey {
             });
         }
         whole
+    }
+
+    /// The limit between the places.
+    pub fn limit(&self) -> Limit<'_> {
+        Limit {
+            straight: &self.straight,
+            ..Limit::new(&self.places)
+        }
     }
 
     /// Keeps what was found, to be slowed again and again.
@@ -112,6 +124,7 @@ impl Survey {
         look: &mut dyn FnMut(f64) -> Spot,
     ) -> bool {
         self.places.clear();
+        self.straight.clear();
         self.tangential = None;
         let mut at_mm = start.at_mm;
         let mut time_s = 0.0;
@@ -122,6 +135,7 @@ impl Survey {
                 at_mm,
                 speed_mm_per_s: spot.speed_mm_per_s,
             });
+            self.straight.push(spot.is_straight);
             self.tangential = Some(
                 self.tangential
                     .map_or(spot.tangential, |least| least.min(&spot.tangential)),
@@ -222,6 +236,8 @@ fn lowest(
 #[derive(Debug)]
 pub struct Limit<'a> {
     places: &'a [Corner],
+    /// Of each place; empty where nothing is known of that.
+    straight: &'a [bool],
     at: usize,
 }
 
@@ -234,7 +250,11 @@ const STEP: f64 = 1.1;
 impl<'a> Limit<'a> {
     /// Of two places at least.
     pub fn new(places: &'a [Corner]) -> Self {
-        Self { places, at: 0 }
+        Self {
+            places,
+            straight: &[],
+            at: 0,
+        }
     }
 
     /// The limit at `at_mm`, mm/s; found soonest near the last one asked for.
@@ -253,6 +273,17 @@ impl<'a> Limit<'a> {
         let [a, b] = [self.places[self.at], self.places[self.at + 1]];
         let share = ((at_mm - a.at_mm) / (b.at_mm - a.at_mm)).clamp(0.0, 1.0);
         a.speed_mm_per_s + share * (b.speed_mm_per_s - a.speed_mm_per_s)
+    }
+
+    /// The limit between two path coordinates where the path is straight and the limit the same all along, mm/s.
+    pub fn level_between(&mut self, from_mm: f64, to_mm: f64) -> Option<f64> {
+        let speed = self.at(from_mm);
+        let mut within = (self.at..self.places.len())
+            .take_while(|place| *place == self.at || self.places[*place].at_mm < to_mm);
+        let is_level = within.all(|place| {
+            self.straight.get(place) == Some(&true) && self.places[place].speed_mm_per_s == speed
+        });
+        (is_level && self.at(to_mm) == speed).then_some(speed)
     }
 
     /// The places behind one path coordinate, at which the limit was asked for last, and before another, right behind which the limit

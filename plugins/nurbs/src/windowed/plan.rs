@@ -1,6 +1,6 @@
 //! Planning one window.
 
-use super::corners::{Limit, SECTIONS, Spot, Survey};
+use super::corners::{SECTIONS, Spot, Survey};
 use super::grade::Grade;
 use super::motion::Ramps;
 use super::points::ease;
@@ -119,7 +119,7 @@ impl Windowed {
 
     /// Lowers the speed where samples exceed acceleration or jerk: what ramps with less jerk do not mend is of the path.
     fn slow_there(&mut self, known: usize, window: &Window<Ramps>) {
-        let mut limit = Limit::new(&self.survey.places);
+        let mut limit = self.survey.limit();
         for part in self.slowdowns.since(known).filter(|part| part.jerk < 1.0) {
             let middle_mm = f64::midpoint(part.from_mm, part.to_mm);
             let driven = window
@@ -134,7 +134,7 @@ impl Windowed {
 
     /// Less where single points exceed the jerk; false where none does.
     fn ease(&mut self, job: &Job<Ramps>, window: &Window<Ramps>) -> bool {
-        let mut limit = Limit::new(&self.survey.places);
+        let mut limit = self.survey.limit();
         let grade = self.grade.as_mut();
         grade.is_some_and(|grade| {
             ease(
@@ -164,11 +164,11 @@ impl Windowed {
         };
         let grade = self.grade.get_or_insert_with(|| Grade::even(least));
         grade.least = least;
-        let corners = &mut self.survey.corners;
-        let mut limit = Limit::new(&self.survey.places);
+        let mut corners = std::mem::take(&mut self.survey.corners);
+        let mut limit = self.survey.limit();
         let ramps = &mut window.motion.0;
         self.rounds.make(
-            corners,
+            &mut corners,
             self.survey.feed_mm_per_s,
             grade,
             &mut limit,
@@ -179,7 +179,8 @@ impl Windowed {
             &mut window.times,
             window.motion.0.iter().map(|ramp| ramp.duration_s),
         );
-        corners[0].speed_mm_per_s >= job.start.state.speed_mm_per_s
+        self.survey.corners = corners;
+        self.survey.corners[0].speed_mm_per_s >= job.start.state.speed_mm_per_s
             && window.times.len() > 1
             && window.duration_s() <= longest_s(job.bounds)
     }
@@ -205,6 +206,7 @@ fn spot(route: &Route, bounds: &Bounds, at_mm: f64, cursor: &mut Cursor) -> Spot
             acceleration_mm_per_s2: leg.least.acceleration_mm_per_s2,
             jerk_mm_per_s3: leg.least.jerk_mm_per_s3,
         },
+        is_straight: leg.course.is_straight(),
         step_mm: step_mm.min(max_mm),
         knot_mm,
     }

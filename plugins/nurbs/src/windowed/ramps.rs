@@ -29,6 +29,29 @@ pub struct Care {
 struct Pair {
     ends: [Corner; 2],
     found: [Option<Corner>; 3],
+    /// The limit where it is level and ramps to the highest feed of the window go beyond it: they keep to it, and no corner is needed. Of
+    /// corners there would be one more in each round, and more rounds than there are for a long line before one of a higher feed.
+    level_mm_per_s: Option<f64>,
+}
+
+impl Pair {
+    fn look(ends: [Corner; 2], parts: &[Ramp; 3], limit: &mut Limit, care: &Care) -> Self {
+        let found = parts.map(|ramp| worst(&ramp, limit, care));
+        let is_above = found.iter().any(Option::is_some);
+        let level_mm_per_s = is_above
+            .then(|| limit.level_between(ends[0].at_mm, ends[1].at_mm))
+            .flatten()
+            .filter(|level| ends.iter().all(|end| end.speed_mm_per_s <= *level));
+        Self {
+            ends,
+            found: if level_mm_per_s.is_some() {
+                [None; 3]
+            } else {
+                found
+            },
+            level_mm_per_s,
+        }
+    }
 }
 
 /// Plans; keeps its memory.
@@ -71,14 +94,14 @@ impl Rounds {
                     .is_some()
                 {}
                 // A pair looked at before, with the same speeds, has nothing new.
-                let found = match known.peek() {
-                    Some(pair) if pair.ends == *ends => pair.found,
-                    _ => parts.map(|ramp| worst(&ramp, limit, care)),
+                let pair = match known.peek() {
+                    Some(pair) if pair.ends == *ends => **pair,
+                    _ => Pair::look([ends[0], ends[1]], &parts, limit, care),
                 };
-                self.pairs.push(Pair {
-                    ends: [ends[0], ends[1]],
-                    found,
-                });
+                self.pairs.push(pair);
+                let parts = pair
+                    .level_mm_per_s
+                    .map_or(parts, |speed| ramps(&ends[0], &ends[1], speed, limits));
                 into.extend(parts.into_iter().filter(|ramp| ramp.duration_s > 0.0));
             }
             let found = self
@@ -113,7 +136,8 @@ fn merge(corners: &mut Vec<Corner>) {
 }
 
 /// The place of a ramp that is furthest above the limit, as a corner at the limit. Between two looks the limit may be lower than at
-/// both: where a block of a higher feed begins.
+/// both: where a block of a higher feed begins. That place comes before others that are as far above: up to it the limit may be level,
+/// and a ramp of its own keeps to that.
 fn worst(ramp: &Ramp, limit: &mut Limit, care: &Care) -> Option<Corner> {
     if ramp.duration_s == 0.0 {
         return None;
@@ -121,8 +145,8 @@ fn worst(ramp: &Ramp, limit: &mut Limit, care: &Care) -> Option<Corner> {
     let looks = (ramp.duration_s / care.look_s).ceil().clamp(1.0, MAX_LOOKS);
     let mut most = 1.0 + care.over;
     let mut found = None;
-    let mut compare = |[at_mm, speed]: [f64; 2], allowed: f64| {
-        if speed > most * allowed {
+    let mut compare = |[at_mm, speed]: [f64; 2], allowed: f64, is_step: bool| {
+        if speed > most * allowed || (is_step && found.is_some() && speed >= most * allowed) {
             most = speed / allowed;
             found = Some(Corner {
                 at_mm,
@@ -139,10 +163,10 @@ fn worst(ramp: &Ramp, limit: &mut Limit, care: &Care) -> Option<Corner> {
             // Ramps are monotonous.
             if speed.max(before_speed) > (1.0 + care.over) * place.speed_mm_per_s {
                 let passed = ramp.at(ramp.time_at(place.at_mm, [before_s, t_s]));
-                compare([place.at_mm, passed[1]], place.speed_mm_per_s);
+                compare([place.at_mm, passed[1]], place.speed_mm_per_s, true);
             }
         }
-        compare([at_mm, speed], limit.at(at_mm));
+        compare([at_mm, speed], limit.at(at_mm), false);
         before = [t_s, at_mm, speed];
     }
     found

@@ -77,6 +77,7 @@ fn spot(curve: &Nurbs, table: &ArcLength, s_mm: f64) -> Spot {
     Spot {
         speed_mm_per_s,
         tangential: LIMITS,
+        is_straight: false,
         step_mm: (0.03 / bend).clamp(3e-4, 0.05),
         knot_mm: f64::INFINITY,
     }
@@ -292,6 +293,7 @@ fn no_ramp_rises_before_the_end_of_a_block_of_a_lower_feed() {
         Spot {
             speed_mm_per_s: if low { LOW } else { 400.0 },
             tangential: LIMITS,
+            is_straight: false,
             step_mm: 0.01,
             knot_mm: if low && at_mm < END_MM {
                 END_MM - at_mm
