@@ -200,7 +200,11 @@ impl Asked {
         };
         match self.planner {
             Some(Planner::AfterInterpolation) => {
-                options.checks = vec![Check::Period, Check::Travel, Check::EndPoint];
+                options.checks = vec![Check::Period, Check::EndPoint];
+                // Its motion is beyond what the limits can brake before the end of the travel; an emergency stop keeps to the limits.
+                if self.emergency.is_none() {
+                    options.checks.push(Check::Travel);
+                }
             }
             Some(Planner::BlockOverlap) => {
                 options.feed_window_s = Some(self.overlap_s);
