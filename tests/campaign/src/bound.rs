@@ -1,6 +1,6 @@
 //! How long a run may take at most: crude, but of its own, so that a machine that stands still or crawls is found.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use tandem_host::{Switches, each_block};
 use tandem_machine::Machine;
@@ -64,7 +64,16 @@ pub struct Sways {
     /// a millimetre, as the way that its feed counts.
     beside: BTreeMap<u32, f64>,
     /// Lines with blocks in which rotary axes alone turn: their feed counts radians.
-    alone: BTreeSet<u32>,
+    alone: BTreeMap<u32, TurnedAlone>,
+}
+
+/// What rotary axes turn alone on a line.
+#[derive(Clone, Copy, Debug, Default)]
+struct TurnedAlone {
+    /// How far in all, deg.
+    way_deg: f64,
+    /// At most how fast, deg/s, without an override.
+    max_speed_deg_per_s: f64,
 }
 
 impl Sways {
@@ -78,15 +87,41 @@ impl Sways {
 
     /// Whether a line has blocks in which rotary axes alone turn.
     pub fn turns_alone(&self, line: u32) -> bool {
-        self.alone.contains(&line)
+        self.alone.contains_key(&line)
     }
 
-    fn add(&mut self, block: &Block, moved: &[(usize, f64)], rotary: impl Fn(usize) -> bool) {
+    /// How far the lines from `first` to `last` turn rotary axes alone at most within `time_s`, deg.
+    pub fn max_turned_alone_deg(&self, first: u32, last: u32, time_s: f64) -> f64 {
+        let lines = first.min(last)..=first.max(last);
+        let (way_deg, max_speed_deg_per_s) =
+            self.alone
+                .range(lines)
+                .fold((0.0, 0.0_f64), |(way_deg, speed), (_, turned)| {
+                    (
+                        way_deg + turned.way_deg,
+                        speed.max(turned.max_speed_deg_per_s),
+                    )
+                });
+        f64::min(way_deg, max_speed_deg_per_s * time_s)
+    }
+
+    fn add(
+        &mut self,
+        block: &Block,
+        moved: &[(usize, f64)],
+        rotary: impl Fn(usize) -> bool,
+        max_speed_deg_per_s: f64,
+    ) {
         let turned = moved.iter().filter(|(axis, _)| rotary(*axis));
         let squares: f64 = turned.map(|(_, by)| by * by).sum();
         let moves_linear = moved.iter().any(|(axis, by)| !rotary(*axis) && *by > 0.0);
         if squares > 0.0 && !moves_linear {
-            self.alone.insert(block.line);
+            let turned = self.alone.entry(block.line).or_default();
+            turned.way_deg += squares.sqrt();
+            let fed_deg_per_s = block.feed_mm_per_s.to_degrees();
+            turned.max_speed_deg_per_s = turned
+                .max_speed_deg_per_s
+                .max(fed_deg_per_s.min(max_speed_deg_per_s));
         } else if squares > 0.0 {
             let times = (1.0 + squares / (block.length_mm * block.length_mm)).sqrt();
             let most = self.beside.entry(block.line).or_insert(1.0);
@@ -171,9 +206,9 @@ impl<'a> Bound<'a> {
             })
             .collect();
         let axes = &self.axes;
-        self.sways.add(block, &moved, |index| {
-            axes.iter().any(|(axis, rotary)| *axis == index && *rotary)
-        });
+        let rotary = |index| axes.iter().any(|(axis, rotary)| *axis == index && *rotary);
+        self.sways
+            .add(block, &moved, rotary, self.max_speed_together(&moved));
         let overhead_s =
             self.filter_s + 2.0 * self.time_constant_s / SLACK + 4.0 * self.machine.fine_period_s;
         let moving_s = match block.kind {
@@ -184,6 +219,19 @@ impl<'a> Bound<'a> {
             _ => self.straight_s(block, &moved),
         };
         self.total_s += moving_s + overhead_s;
+    }
+
+    /// The speed of the axes that are moved, each at its highest, mm/s, or deg/s of rotary ones.
+    fn max_speed_together(&self, moved: &[(usize, f64)]) -> f64 {
+        let moves = |axis: &&Axis| {
+            moved
+                .iter()
+                .any(|&(index, by)| index == axis.index && by > 0.0)
+        };
+        let axes = self.machine.axes.iter().filter(moves);
+        axes.map(|axis| axis.max_speed_mm_per_s().powi(2))
+            .sum::<f64>()
+            .sqrt()
     }
 
     /// The axes and the joints, each with how far a block that moves the axes by `moved` moves it at most.

@@ -111,7 +111,7 @@ pub fn drive(case: &Case, folder: &Path, registry: &Registry) -> Result<Driven, 
     forget_most_memory();
     let prepared = Run::prepare(machine.clone(), registry, parsed, Switches::default());
     let run = prepared.map_err(|refusal| Box::new(refused(&refusal)))?;
-    let mut kept = Kept::new(&machine, max_samples, asks.sways);
+    let mut kept = Kept::new(&machine, max_samples, asks.sways, asked.max_ratio);
     let driven = catch_unwind(AssertUnwindSafe(|| {
         run.drive(Clock::Virtual, &asked.commands, &mut kept)
     }));
@@ -159,12 +159,13 @@ struct Kept {
     longest_step_mm: f64,
     axes: Vec<(usize, bool)>,
     sways: Sways,
+    max_ratio: f64,
     period_s: f64,
     most: usize,
 }
 
 impl Kept {
-    fn new(machine: &Machine, most: usize, sways: Sways) -> Self {
+    fn new(machine: &Machine, most: usize, sways: Sways, max_ratio: f64) -> Self {
         let axis = |axis| {
             (
                 axis_index(machine.axes.letter(axis)).unwrap_or_default(),
@@ -177,6 +178,7 @@ impl Kept {
             longest_step_mm: 0.0,
             axes,
             sways,
+            max_ratio,
             period_s: machine.fine_period_s,
             most,
         }
@@ -194,8 +196,7 @@ impl RunObserver for Kept {
             let at = sample.command[from];
             row.command[to] = if rotary { at.to_degrees() } else { at };
         }
-        // Where only rotary axes move, the feed is theirs; so it is where a period ends in a block of that kind, whatever it drove
-        // before.
+        // Where only rotary axes move, the feed is theirs; so it is where a period ends in a block of that kind.
         let moves = |axis: &(usize, bool)| {
             !axis.1
                 && self
@@ -206,12 +207,19 @@ impl RunObserver for Kept {
         let turns = self.axes.iter().any(|axis| axis.1) && !self.axes.iter().any(moves);
         let step = sample.feed_mm_per_s * self.period_s;
         let before = self.rows.last().map_or(sample.line, |last| last.line);
-        let way = if turns || self.sways.turns_alone(sample.line) {
+        let ends_in_mm = if turns || self.sways.turns_alone(sample.line) {
             step.to_degrees()
         } else {
             step * self.sways.most(before, sample.line)
         };
-        self.longest_step_mm = self.longest_step_mm.max(way);
+        // Before that, the period may have driven blocks of the other kind, whose feed the sample does not tell.
+        let passed_deg = if before == sample.line {
+            0.0
+        } else {
+            let time_s = self.max_ratio * self.period_s;
+            self.sways.max_turned_alone_deg(before, sample.line, time_s)
+        };
+        self.longest_step_mm = self.longest_step_mm.max(ends_in_mm + passed_deg);
         self.rows.push(row);
         if self.rows.len() > self.most {
             resume_unwind(Box::new(TooLong));
