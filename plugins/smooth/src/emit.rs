@@ -78,9 +78,10 @@ impl<const L: usize> PathAhead<L> {
                 f64::INFINITY
             };
             self.begin_report(from_s, end_s, blocks, sink);
-            // Blocks of which less than a fine period is left share a segment, which is named by the last of them.
+            // Blocks of which less than a fine period is left share a segment, which is named by the last of them. One that goes on
+            // in the next piece is left to that: what it has there is still to be driven at its own feed.
             let another = self.route.items.len() > 1;
-            if end_s < from_s + period_s && another {
+            if end_s < from_s + period_s && end_s <= until_s && another {
                 shared = Some(Shared::with(shared, blocks.blank.feed_mm_per_s, end_s));
                 self.pop_front();
                 continue;
