@@ -79,9 +79,10 @@ impl<const L: usize> PathAhead<L> {
             };
             self.begin_report(from_s, end_s, blocks, sink);
             // Blocks of which less than a fine period is left share a segment, which is named by the last of them. One that goes on
-            // in the next piece is left to that: what it has there is still to be driven at its own feed.
+            // in the next piece, before another feed, is left to that: what it has there is still to be driven at its own feed.
             let another = self.route.items.len() > 1;
-            if end_s < from_s + period_s && end_s <= until_s && another {
+            let goes_on = end_s > until_s && self.route.end_before_other_feed().is_some();
+            if end_s < from_s + period_s && another && !goes_on {
                 shared = Some(Shared::with(shared, blocks.blank.feed_mm_per_s, end_s));
                 self.pop_front();
                 continue;
