@@ -62,7 +62,8 @@
 //! **Order 3.** An axis jerks by q‴σ³ + 3q″σσ̇ + q′σ̈. σ̈ is constant within a period. The points of the period give an
 //! interval for it, linear in σ̈. What is wanted of it comes from two time-optimal laws, one in σ (back to 1) and one
 //! in the path speed (down to a cap, or to rest); to rest it is never less braking than the second law asks of a plan of
-//! constant speed, for a plan that brakes for a corner gets faster again after it. The governor takes as much of that as
+//! constant speed, for a plan that brakes for a corner gets faster again after it, nor than the axis needs that alone would come to
+//! rest clearly later (`wanted_by_slowest`). The governor takes as much of that as
 //! still lets it make the rate constant again: from the end of the period on σ̇ must come to zero, within the limits at the ends and in the middle of every stretch of a segment that a
 //! period drives, within 0 ≤ σ ≤ 1, and within what is queued, tried out on the queued plan period by period. So σ
 //! comes to 0 and to 1 with σ̇ = 0. A constant σ is always admissible, and the way that was found is kept: where the
@@ -120,7 +121,8 @@ const TOLERANCE: f64 = 1e-6;
 pub enum Goal {
     /// Rest along the path: a hold, a stop, or a feed of nothing.
     Rest {
-        /// Rate to reach as far as the path's speed does not say how to stop: where the plan stands still it says nothing.
+        /// Rate that counts where the plan stands still, so that no speed says how to stop: 0 stays there, 1 lets its time pass to where it
+        /// moves.
         sigma: f64,
     },
     /// A rate at which the plan is followed.

@@ -1,14 +1,14 @@
 //! Laws of motion along one coordinate whose second derivative is bounded: how to come to rest in the shortest time.
 
-/// The second derivative, within `±most`, that brings a double integrator to `x = 0, rate = 0`, coming in with `gentle`.
+/// The second derivative, within `±most`, that brings a double integrator to `x = 0, rate = 0`, coming in with `coming_in`.
 ///
 /// The discrete time-optimal law of Han, "From PID to Active Disturbance Rejection Control", IEEE Trans. Ind. Electron.
 /// 56(3), 2009, equation (5), for `x ← x + h·rate, rate ← rate + h·u`: it reaches rest without chatter. Here the curve on
-/// which it comes in is drawn with `gentle ≤ most`, so that there is room to get back onto it when what `most` may be
+/// which it comes in is drawn with `coming_in ≤ most`, so that there is room to get back onto it when what `most` may be
 /// changes on the way. A sampled motion with u constant within each period has this form in `x − h·rate/2`, which the
 /// caller passes.
-pub fn to_rest(x: f64, rate: f64, gentle: f64, most: f64, period_s: f64) -> f64 {
-    let step = gentle * period_s * period_s;
+pub fn to_rest(x: f64, rate: f64, coming_in: f64, most: f64, period_s: f64) -> f64 {
+    let step = coming_in * period_s * period_s;
     if step <= 0.0 {
         return 0.0;
     }
@@ -180,24 +180,25 @@ mod tests {
     #[test]
     fn the_sampled_law_reaches_rest_in_the_shortest_time_and_stays_there() {
         let h = 0.001;
-        for (from, gentle, most) in [(1.0, 50.0, 50.0), (-0.3, 20.0, 60.0), (0.002, 30.0, 30.0)] {
+        for (from, coming_in, most) in [(1.0, 50.0, 50.0), (-0.3, 20.0, 60.0), (0.002, 30.0, 30.0)]
+        {
             let (mut x, mut rate, mut periods) = (from, 0.0, 0);
-            let peak = (2.0 * f64::abs(from) / (1.0 / most + 1.0 / gentle)).sqrt();
-            let shortest_s = peak / most + peak / gentle;
+            let peak = (2.0 * f64::abs(from) / (1.0 / most + 1.0 / coming_in)).sqrt();
+            let shortest_s = peak / most + peak / coming_in;
             while f64::abs(x) > 1e-9 || f64::abs(rate) > 1e-9 {
-                let change = to_rest(x - h * rate / 2.0, rate, gentle, most, h);
+                let change = to_rest(x - h * rate / 2.0, rate, coming_in, most, h);
                 assert!(change.abs() <= most);
                 x += h * (rate + h * change / 2.0);
                 rate += h * change;
                 periods += 1;
-                assert!(x * from > -2.0 * gentle * h * h, "it goes beyond: {x}");
+                assert!(x * from > -2.0 * coming_in * h * h, "it goes beyond: {x}");
                 assert!(
                     f64::from(periods) * h < 1.02 * shortest_s + 5.0 * h,
                     "{from}: {x}, {rate}"
                 );
             }
             assert!(f64::from(periods) * h > 0.98 * shortest_s);
-            assert_eq!(to_rest(0.0, 0.0, gentle, most, h), 0.0);
+            assert_eq!(to_rest(0.0, 0.0, coming_in, most, h), 0.0);
         }
         assert_eq!(to_rest(1.0, 0.0, 0.0, 1.0, h), 0.0);
     }

@@ -269,7 +269,7 @@ impl Interpreter {
         self.state.compensation = Compensation::default();
     }
 
-    /// Manual input: an abort, a error or an emergency stop has switched spindle and coolant off, and outputs as the machine file
+    /// Manual input: an abort, an error or an emergency stop has switched spindle and coolant off, and outputs as the machine file
     /// says; what the next line asks for is sent, whatever it was before.
     pub fn set_switched_off(&mut self) {
         self.state.spindle.direction = 0;

@@ -286,7 +286,7 @@ impl Line<'_> {
     fn feed_a_revolution(&self) -> Checked<f64> {
         let speed_rad_per_s = self.state.spindle.speed_rad_per_s;
         if speed_rad_per_s <= 0.0 {
-            return Err(self.motion_fault(
+            return Err(self.motion_error(
                 "feed-missing",
                 "G95 is a feed a revolution, and the spindle has no speed (S)",
             ));
@@ -322,7 +322,7 @@ impl Line<'_> {
         } else {
             "with G93 every line with G1, G2 or G3 needs its F"
         };
-        self.motion_fault("feed-missing", why)
+        self.motion_error("feed-missing", why)
     }
 
     #[cold]
@@ -337,7 +337,7 @@ impl Line<'_> {
             .map_or("G1, G2 and G3 need".into(), |word| {
                 format!("{} needs", word.code)
             });
-        self.motion_fault("feed-missing", format!("{why}; {who} one"))
+        self.motion_error("feed-missing", format!("{why}; {who} one"))
     }
 
     /// Appends a block.
@@ -439,12 +439,12 @@ impl Line<'_> {
         } else if self.orders.axes_taken {
             self.orders.error(Group::NonModal, "travel", message)
         } else {
-            self.motion_fault("travel", message)
+            self.motion_error("travel", message)
         }
     }
 
-    /// A error at the motion word, or at the first axis word where the motion is modal.
-    pub fn motion_fault(&self, code: &'static str, message: impl Into<String>) -> LineError {
+    /// An error at the motion word, or at the first axis word where the motion is modal.
+    pub fn motion_error(&self, code: &'static str, message: impl Into<String>) -> LineError {
         match self.words.first_of(AXIS_MASK) {
             _ if self.orders.has(Group::Motion) => self.orders.error(Group::Motion, code, message),
             Some((_, span)) => LineError::new(span, code, message),

@@ -17,12 +17,12 @@ pub enum TimeGoesTo {
     Stop(StopCause),
     /// The operator's override, below 100 %.
     Override,
-    /// The feed strategy's ratio, below 1.
+    /// The ratio of the feed strategy and of policies, below 1.
     Strategy,
     /// Program time passed slower though no ratio asked for it: the way back from a stop or an override, what the ring of
     /// segments holds, or a plan beyond its limits.
     Governor,
-    /// At rest with nothing to drive: the program waits for an input.
+    /// At rest with nothing to drive: the program waits for an input, or what follows a probe is planned.
     Rest,
     /// Motion of a block that no planner has reported.
     Unreported,
@@ -170,7 +170,7 @@ impl BlockTimes {
         let operator = if rapid {
             sample.given.rapid_override
         } else {
-            sample.given.feed_override
+            sample.feed_override
         };
         // The sample holds both together.
         let strategy = if rapid || operator <= 0.0 {
@@ -281,5 +281,23 @@ mod tests {
             blocks.iter().map(|(index, _)| *index).collect::<Vec<_>>(),
             [0, 1, 2, 3]
         );
+    }
+
+    /// The knob stands at 50 %, and on the way back from a hold the rate is there too.
+    #[test]
+    fn an_override_that_the_program_forbids_takes_no_time() {
+        for (feed_override, ratio, name) in [(0.5, 0.5, "override"), (1.0, 1.0, "governor")] {
+            let mut sample = Sample {
+                feed_override,
+                ratio,
+                sigma: 0.5,
+                programmed_feed_mm_per_s: 10.0,
+                state: MachineState::Running,
+                ..Sample::default()
+            };
+            sample.given.feed_override = 0.5;
+            let goes_to = BlockTimes::new(1e-3, 1.0).asked(&sample).unwrap();
+            assert_eq!(goes_to.name(), name);
+        }
     }
 }

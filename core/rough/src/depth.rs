@@ -3,8 +3,8 @@
 //! # The depth, and turning
 //!
 //! Starvation must end on the path, inside what is queued. Each segment declares the path deceleration that the plan
-//! leaves everywhere in it, `Segment::stop_deceleration_mm_per_s2`, its own braking counted. The rough loop keeps the
-//! greatest path speed v and the smallest declared deceleration `a_s` of all that is queued and keeps at least
+//! leaves everywhere in it, `Segment::stop_deceleration_mm_per_s2`, its own braking counted. With the path speed v of a segment, and its
+//! declared deceleration `a_s` and jerk J, the rough loop keeps at least
 //!
 //! ```text
 //! v / (0.95·a_s) + a_s/(0.8·J) + easing + two rough periods

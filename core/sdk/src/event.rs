@@ -39,7 +39,8 @@ pub enum EventKind {
     HomeByDrive = 15,
     /// An analogue output: `index` is its number (0 to 63), `value` what it is set to (M67, M68).
     AnalogOutput = 16,
-    /// The spindle, which has stopped, turns to the angle `value`, rad, and holds it (M19). The machine is at rest.
+    /// The spindle, which has stopped, is to turn to the angle `value`, rad, and hold it (M19). The machine is at rest. No driver is
+    /// asked for it yet: a program for drives that move something is refused it.
     OrientSpindle = 17,
     /// A command of the machine's own: `index` is 100 for M100, `value` its P, or −1. The machine is at rest; who runs it
     /// is the soft side, this only tells.

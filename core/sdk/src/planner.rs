@@ -134,7 +134,7 @@ pub enum LimitedBy {
     Junction = 3,
     /// An axis speed limit.
     Velocity = 4,
-    /// The end of the planner's buffer.
+    /// So short that at its feed more blocks would pass in a fine period than one can drive.
     Buffer = 5,
     /// The time constant.
     TimeConstant = 6,

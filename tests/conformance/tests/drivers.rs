@@ -2,6 +2,9 @@
 
 #![allow(clippy::unnecessary_wraps)] // the form of constructors
 
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::time::Instant;
+
 use tandem_conformance::{Setup, judge};
 use tandem_sdk::{
     Attached, AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, Latch,
@@ -12,8 +15,13 @@ tandem_sdk::options! {
     struct Options {
         /// The promise that is broken; none where it is empty.
         defect: String = String::new(),
+        /// Whether they say that they move metal.
+        is_real: bool = false,
     }
 }
+
+/// The shortest time between two exchanges of drives that say they move metal, ns.
+static SHORTEST_NS: AtomicU64 = AtomicU64::new(u64::MAX);
 
 /// Joint 1 goes into a fault in mid-motion, once; beyond that the drives follow exactly, and take five periods to come up.
 struct Drives {
@@ -24,6 +32,8 @@ struct Drives {
     exchanges: u64,
     is_faulty: bool,
     last: Feedback,
+    is_real: bool,
+    exchanged: Option<Instant>,
 }
 
 /// Exchanges after which the fault comes, and for how long a drive is not heard.
@@ -40,6 +50,8 @@ impl Drives {
             exchanges: 0,
             is_faulty: false,
             last: Feedback::default(),
+            is_real: options.is_real,
+            exchanged: None,
         })
     }
 
@@ -101,17 +113,19 @@ impl Driver for Drives {
         DriverDescription {
             enable_s: 0.1,
             disable_s: 0.1,
+            simulated: u32::from(!self.is_real),
             ..DriverDescription::simulated()
         }
     }
 
     fn open(&mut self, context: &DriverContext) -> Result<(), PluginError> {
+        assert_eq!(context.real_time != 0, self.is_real);
         (self.joints, self.stands) = (context.joint_count as usize, context.start_position);
         Ok(())
     }
 
     fn start(&mut self) -> Result<Attached, PluginError> {
-        self.coming = 0;
+        (self.coming, self.exchanged) = (0, None);
         let mut attached = Attached::at(self.stands);
         if self.is("stands nowhere") {
             attached.position[2] = f64::NAN;
@@ -131,6 +145,10 @@ impl Driver for Drives {
         feedback: &mut Feedback,
     ) -> Result<(), PluginError> {
         self.exchanges += 1;
+        let now = Instant::now();
+        if let Some(before) = self.exchanged.replace(now).filter(|_| self.is_real) {
+            SHORTEST_NS.fetch_min((now - before).as_nanos() as u64, Relaxed);
+        }
         self.answer(setpoint, feedback);
         let unheard = UNHEARD.contains(&self.exchanges);
         let lost = self.is("repeats old as new") || self.is("hides a lost joint");
@@ -204,4 +222,22 @@ fn each_broken_promise_is_found() {
             "{defect}: {check}\n{report}"
         );
     }
+}
+
+/// What is told to real drives sooner than a period after the setpoint before asks for more speed than it says.
+#[test]
+fn drives_that_move_metal_are_not_told_anything_sooner_than_a_period_later() {
+    let plugin = local_plugin!(driver "drives" = Drives::open);
+    let setup = Setup {
+        options: "is_real = true\n".to_string(),
+        moves_metal: true,
+        ..Setup::default()
+    };
+    let report = judge(plugin, &setup);
+    assert!(report.conforms(), "{report}");
+    let shortest_ns = SHORTEST_NS.load(Relaxed);
+    assert!(
+        (1_000_000..u64::MAX).contains(&shortest_ns),
+        "{shortest_ns} ns"
+    );
 }

@@ -255,10 +255,10 @@ impl Governor {
         if over == 0.0 && along == 0.0 {
             return free.min(0.0);
         }
-        let gentle = horizon.approach_jerk_share * path_jerk;
+        let coming_in = horizon.approach_jerk_share * path_jerk;
         let towards = |along: f64| {
             let last = APPROACH_END_FACTOR * path_jerk;
-            to_rest(over - h * along / 2.0, along, gentle, last, h)
+            to_rest(over - h * along / 2.0, along, coming_in, last, h)
         };
         let planned = sigma * (sigma * sigma * jerk + 3.0 * acceleration * rate);
         let mut capped = (towards(along) - planned) / speed;
@@ -307,7 +307,7 @@ impl Governor {
         wanted
     }
 
-    /// `wanted` in small steps, which the limits do not ask for where next to nothing moves; larger ones to end an approach.
+    /// σ̈ of `wanted` in small steps, which the limits do not ask for where next to nothing moves; larger ones to end an approach.
     ///
     /// A constant rate counts as a rising one. So the first step of a hold may be one of the larger ones, though it ends nothing:
     /// the limits bound it all the same, and with the small bound there no test of this crate had another result.
@@ -331,14 +331,14 @@ impl Governor {
         if free < most { free } else { f64::INFINITY }
     }
 
-    fn approach(&self, off: f64, gentle: f64, most: f64) -> f64 {
+    fn approach(&self, off: f64, coming_in: f64, most: f64) -> f64 {
         if off == 0.0 && self.rate_per_s == 0.0 {
             return 0.0;
         }
         to_rest(
             off - self.period_s * self.rate_per_s / 2.0,
             self.rate_per_s,
-            gentle,
+            coming_in,
             most,
             self.period_s,
         )

@@ -77,8 +77,8 @@ pub const APPROACH_JERK_SHARE: f64 = 0.8;
 /// the approach, which comes in by whole periods.
 pub const STRAIGHT_ON_JERK_SHARE: f64 = 0.97;
 
-/// Order 3: how many times as fast an approach may end as it begins, in σ̈. Its beginning is gentle where next to nothing moves; its
-/// end is not put off for that.
+/// Order 3: how many times as much σ̈ may be where an approach ends as where it begins. It begins in small steps where next to nothing
+/// moves; its end is not put off for that.
 pub const APPROACH_END_FACTOR: f64 = 4.0;
 
 /// Order 3: most that σ̈ may be, as a change of the change of σ in a period, without unit: σ changes in small steps also where

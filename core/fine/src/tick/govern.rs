@@ -23,6 +23,8 @@ use crate::slowdowns::{EndOfLine, LineEnd, Slowdowns};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Ask {
     Run,
+    /// The operator, the program, a spindle that is not at speed, a fault of the soft side, or the end of a line in single block. It
+    /// comes before [`Ask::Starve`]: what is queued is enough for the stop.
     Hold,
     /// For good: an edge has come, or the operator aborts.
     Stop,

@@ -196,7 +196,7 @@ impl LineWords {
         self.spans[index(letter)]
     }
 
-    /// A error at the word `letter`.
+    /// An error at the word `letter`.
     pub fn error(&self, letter: u8, code: &'static str, message: impl Into<String>) -> LineError {
         LineError::new(self.span(letter), code, message)
     }

@@ -159,7 +159,7 @@ pub(super) fn plane(line: &Line) -> Checked<[usize; 2]> {
                 "an arc in the plane {a}{b} needs two linear axes; this machine has {}",
                 line.letters.list()
             );
-            Err(line.motion_fault("axis", message))
+            Err(line.motion_error("axis", message))
         }
     }
 }
@@ -198,7 +198,7 @@ fn circle(line: &Line, ends: &Ends, plane: [usize; 2]) -> Checked<Parts> {
         (None, [None, None]) => return Err(no_center(line, letters)),
         (None, given) => ends.about(center(line, ends, plane, given)?),
     };
-    arc.map_err(|(code, message)| arc_fault(line, letters, code, message))
+    arc.map_err(|(code, message)| arc_error(line, letters, code, message))
 }
 
 /// The centre in machine coordinates.
@@ -212,7 +212,7 @@ fn center(
     let coordinates = &line.state.coordinates;
     if coordinates.is_rotated() && line.state.modes.plane != Plane::Xy {
         let message = "in a rotated coordinate system (G10 L2 R) arcs lie in the plane XY (G17)";
-        return Err(line.motion_fault("arc-centre", message));
+        return Err(line.motion_error("arc-centre", message));
     }
     let mut from = AxisVector::ZERO;
     if !line.state.modes.arc_absolute {
@@ -223,7 +223,7 @@ fn center(
         return Ok(std::array::from_fn(|i| ends.start[i] + from[plane[i]]));
     }
     let [Some(a), Some(b)] = given else {
-        return Err(line.motion_fault(
+        return Err(line.motion_error(
             "arc-centre",
             "with G90.1 an arc needs both coordinates of its centre",
         ));
@@ -236,14 +236,14 @@ fn center(
 
 fn no_center(line: &Line, letters: [u8; 2]) -> LineError {
     let [a, b] = letters.map(char::from);
-    line.motion_fault(
+    line.motion_error(
         "arc-centre",
         format!("the arc has no centre ({a} {b}) and no radius (R)"),
     )
 }
 
-/// A error at the words of the circle.
-fn arc_fault(line: &Line, letters: [u8; 2], code: &'static str, message: String) -> LineError {
+/// An error at the words of the circle.
+fn arc_error(line: &Line, letters: [u8; 2], code: &'static str, message: String) -> LineError {
     let spans = [letters[0], letters[1], b'R']
         .into_iter()
         .filter(|l| line.words.has(*l))

@@ -121,7 +121,8 @@ const PECK_CLEARANCE_MM: f64 = 0.254;
 const ROUNDING_MM: f64 = 1e-9;
 /// Moves of a peck: down, out to R, and back to just above where it ended.
 const MOVES_PER_PECK: f64 = 3.0;
-/// Most moves and dwells of a hole without pecks: a kind that makes more of them raises it.
+/// Most moves and dwells of a hole without pecks, with the two rapids to it. L of all kinds is bounded by it: a kind that makes more
+/// needs a number of its own.
 const MAX_MOVES_PER_HOLE: f64 = 8.0;
 /// Most moves of a line, so that memory stays bounded.
 const MAX_MOVES: f64 = 100_000.0;
@@ -224,28 +225,33 @@ struct Holes {
     /// From one hole to the next.
     step: [f64; 2],
     count: u32,
+    /// The level where the rapid to the hole ends and the feed begins.
     r_mm: f64,
+    /// The level of Z, or of the axis across the plane.
     bottom_mm: f64,
     peck_mm: f64,
     dwell_s: f64,
+    /// The level to which the tool leaves the hole: R, or with G98 where the first of the cycles began.
     clear_mm: f64,
 }
 
 fn cycle(line: &mut Line, kind: Kind) -> Checked<()> {
+    // After an error the reading goes on from where the cycle leaves the tool, not from the words X, Y and Z of the line.
     line.state.path.moved = true;
     line.refuse_machine_coordinates()?;
     if line.words.named() == 0 {
         let message = format!("{} needs at least one of X Y Z", line.orders.motion_code());
-        return Err(line.motion_fault("axis-missing", message));
+        return Err(line.motion_error("axis-missing", message));
     }
     if line.state.modes.feed.mode == FeedMode::InverseTime {
-        return Err(line.motion_fault("conflict", "canned cycles do not go with G93"));
+        return Err(line.motion_error("conflict", "canned cycles do not go with G93"));
     }
     let mut at = line.state.coordinates.to_program(&line.state.path.position);
     let holes = holes(line, kind, &at)?;
     let exact_stop = std::mem::replace(&mut line.state.modes.exact_stop, true);
     let done = drill(line, &holes, &mut at);
     line.state.modes.exact_stop = exact_stop;
+    // What the answer of a probe has set may be in any of the three from here on.
     if line.reads_assumed.get() {
         line.state.path.assumed |= line.letters.axes_of(mask("XYZ"));
     }
@@ -272,7 +278,7 @@ fn word_mm(line: &Line, axis: usize) -> Option<f64> {
 /// What the line says of its holes; `at` is where it begins.
 fn holes(line: &mut Line, kind: Kind, at: &AxisVector) -> Checked<Holes> {
     let plane = line.state.modes.plane.letters();
-    let missing = || line.motion_fault("axis", "a canned cycle needs the linear axes X Y Z");
+    let missing = || line.motion_error("axis", "a canned cycle needs the linear axes X Y Z");
     let (normal, plane) = axes(line.letters, plane).ok_or_else(missing)?;
     let sticky = sticky(line, kind, normal)?;
     let initial_mm = *line.state.cycles.initial_mm.get_or_insert(at[normal]);
@@ -283,7 +289,7 @@ fn holes(line: &mut Line, kind: Kind, at: &AxisVector) -> Checked<Holes> {
     let r_mm = if absolute { r_mm } else { initial_mm + r_mm };
     let bottom_mm = if absolute { depth_mm } else { r_mm + depth_mm };
     if r_mm < bottom_mm {
-        return Err(line.motion_fault("cycle", "R lies below the bottom of the hole"));
+        return Err(line.motion_error("cycle", "R lies below the bottom of the hole"));
     }
     let named = plane.map(|axis| word_mm(line, axis).unwrap_or_default());
     let step = if line.state.modes.absolute {
@@ -307,7 +313,7 @@ fn holes(line: &mut Line, kind: Kind, at: &AxisVector) -> Checked<Holes> {
         };
     if moves > MAX_MOVES {
         let message = format!("this line would make {moves:.0} moves, {MAX_MOVES:.0} are allowed");
-        return Err(line.motion_fault("cycle", message));
+        return Err(line.motion_error("cycle", message));
     }
     Ok(Holes {
         kind,
@@ -335,7 +341,7 @@ fn sticky(line: &mut Line, kind: Kind, normal: usize) -> Checked<Sticky> {
         dwell_s: line.words.not_negative(b'P')?.or(left.dwell_s),
     };
     let missing = |what: &str| -> LineError {
-        line.motion_fault(
+        line.motion_error(
             "word-missing",
             format!("{} needs {what}", line.orders.motion_code()),
         )
@@ -362,7 +368,7 @@ fn sticky(line: &mut Line, kind: Kind, normal: usize) -> Checked<Sticky> {
         }
     }
     if kind.pecks() && sticky.peck_mm.is_some_and(|peck| peck <= 0.0) {
-        return Err(line.motion_fault(
+        return Err(line.motion_error(
             "word-range",
             "Q, the depth of a peck, must be greater than zero",
         ));
@@ -434,7 +440,7 @@ fn hole(line: &mut Line, holes: &Holes, at: &mut AxisVector) -> Checked<()> {
         Kind::BoringStop | Kind::BoringByHand => {
             let direction = line.state.spindle.direction;
             if direction == 0 {
-                return Err(line.motion_fault("cycle", "this cycle needs a spindle that turns"));
+                return Err(line.motion_error("cycle", "this cycle needs a spindle that turns"));
             }
             spindle::stop(line);
             if holes.kind == Kind::BoringByHand {
@@ -480,7 +486,7 @@ fn tap(line: &mut Line, holes: &Holes, at: &mut AxisVector, direction: i8) -> Ch
             "{} needs the spindle to turn {way}",
             line.orders.motion_code()
         );
-        return Err(line.motion_fault("cycle", message));
+        return Err(line.motion_error("cycle", message));
     }
     let permits = line.state.permits;
     overrides::switch(line, FEED, false);

@@ -73,12 +73,13 @@ impl Orders {
         }
     }
 
-    /// A error at the word of `group`.
+    /// An error at the word of `group`, which stands in the line.
     pub fn error(&self, group: Group, code: &'static str, message: impl Into<String>) -> LineError {
+        debug_assert!(self.has(group), "no word of {group:?} in the line");
         LineError::new(self.words[group as usize].1, code, message)
     }
 
-    /// Sorts the words of a line; `modal` is the motion mode before it. After a error what is not at error is sorted
+    /// Sorts the words of a line; `modal` is the motion mode before it. After an error what is not at error is sorted
     /// all the same, so that reading can go on.
     #[inline]
     pub fn sort(&mut self, words: &LineWords, modal: MotionMode, letters: &Letters) -> Checked<()> {

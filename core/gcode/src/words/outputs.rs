@@ -171,13 +171,13 @@ fn wait(line: &mut Line) -> Checked<()> {
             None => Input::Analog(number),
         },
         (Some(_), Some(_)) => {
-            return Err(wait_fault(
+            return Err(wait_error(
                 line,
                 "M66 takes either P, a digital input, or E, an analogue one",
             ));
         }
         (None, None) => {
-            return Err(wait_fault(
+            return Err(wait_error(
                 line,
                 "M66 needs P, the number of a digital input, or E, an analogue one",
             ));
@@ -192,13 +192,13 @@ fn wait(line: &mut Line) -> Checked<()> {
     };
     let timeout_s = line.words.not_negative(b'Q')?.unwrap_or(0.0);
     if mode != InputMode::Immediate && matches!(input, Input::Analog(_)) {
-        return Err(wait_fault(
+        return Err(wait_error(
             line,
             "an analogue input (E) is read at once: M66 E goes with L0 only",
         ));
     }
     if mode != InputMode::Immediate && timeout_s == 0.0 {
-        return Err(wait_fault(
+        return Err(wait_error(
             line,
             "M66 needs Q, the longest wait in seconds, greater than zero",
         ));
@@ -216,7 +216,7 @@ fn wait(line: &mut Line) -> Checked<()> {
     Ok(())
 }
 
-fn wait_fault(line: &Line, message: &str) -> LineError {
+fn wait_error(line: &Line, message: &str) -> LineError {
     line.orders.error(Group::InputOutput, "input", message)
 }
 

@@ -99,7 +99,7 @@ fn probe(line: &mut Line, probe: Probe) -> Checked<()> {
     let length_mm = line.config.axes.path_length(&displacement);
     if length_mm <= NO_MOVE {
         let message = format!("{word} would not move: the probe stands where it is to end");
-        return Err(line.motion_fault("probe-distance", message));
+        return Err(line.motion_error("probe-distance", message));
     }
     let feed_mm_per_s = line.feed(length_mm, line.moves_linear(&displacement))?;
     for axis in (0..line.letters.count()).filter(|axis| displacement[*axis] != 0.0) {
@@ -122,7 +122,7 @@ fn probe(line: &mut Line, probe: Probe) -> Checked<()> {
 fn stop_on(line: &Line, probe: Probe, word: &str) -> Checked<StopOn> {
     let Some(wired) = line.config.probe else {
         let message = format!("{word}: this machine has no probe: its file has no [probe]");
-        return Err(line.motion_fault("refused", message));
+        return Err(line.motion_error("refused", message));
     };
     let edge = if probe.away == wired.inverted {
         Edge::Rising
@@ -145,10 +145,10 @@ fn refuse_same_line(line: &Line, word: &str) -> Checked<()> {
         .is_some_and(|other| other.tenths == 660)
     {
         let message = format!("{word} and M66 each wait for an input: split the line");
-        return Err(line.motion_fault("conflict", message));
+        return Err(line.motion_error("conflict", message));
     }
     if line.words.named() == 0 {
-        return Err(line.motion_fault(
+        return Err(line.motion_error(
             "axis-missing",
             format!("{word} needs at least one axis word"),
         ));
@@ -157,7 +157,7 @@ fn refuse_same_line(line: &Line, word: &str) -> Checked<()> {
         let message = format!(
             "{word} does not go with G93: where it ends is not known, so its time is not either"
         );
-        return Err(line.motion_fault("conflict", message));
+        return Err(line.motion_error("conflict", message));
     }
     Ok(())
 }

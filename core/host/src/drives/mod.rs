@@ -308,7 +308,9 @@ pub fn driver_context(machine: &Machine, joints: &JointSpace) -> DriverContext {
         .homing
         .iter()
         .filter_map(AxisHoming::switch)
-        .fold(0, |mask, switch| mask | bit(switch.input));
+        .flat_map(|switch| [Some(switch.input), switch.index.map(|index| index.input)])
+        .flatten()
+        .fold(0, |mask, input| mask | bit(input));
     for homing in machine.homing.iter().filter(|_| joints.are_axes()) {
         context.joints[homing.axis].homing_method = homing.drive().map_or(0, |drive| drive.method);
         context.joints[homing.axis].homing_torque_percent =

@@ -233,6 +233,19 @@ fn each_driver_is_told_and_answers_in_its_own_numbers() {
         for input in &claimed {
             _ = writeln!(tables, "[inputs.i{input}]\ninput = {input}");
         }
+        let homed_by: Vec<u32> = (0..64).filter(|i| !claimed.contains(i)).take(2).collect();
+        let homing = if let &[switch, index] = &homed_by[..]
+            && random.below(2) == 0
+        {
+            _ = writeln!(
+                tables,
+                "[homing.x]\ninput = {switch}\nsearch_mm_per_min = -60\nlatch_mm_per_min = 30\nback_off_mm = 1\n\
+                 index_input = {index}\nindex_mm = 1\nindex_within_mm = 5"
+            );
+            1 << switch | 1 << index
+        } else {
+            0
+        };
         let measured: Vec<usize> = (0..4).filter(|_| random.below(2) == 0).collect();
         for analog in &measured {
             _ = writeln!(tables, "[analog.s{analog}]\ninput = {analog}");
@@ -277,7 +290,9 @@ fn each_driver_is_told_and_answers_in_its_own_numbers() {
                     .collect::<Vec<_>>(),
                 "seed {seed}"
             );
-            let mask = claimed.iter().fold(0_u64, |mask, input| mask | 1 << input);
+            let mask = claimed
+                .iter()
+                .fold(homing, |mask, input| mask | 1_u64 << input);
             assert_eq!(context.inputs, Own::lines(&own.inputs, mask), "seed {seed}");
             assert_eq!(
                 context.outputs,

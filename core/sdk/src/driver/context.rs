@@ -82,13 +82,15 @@ pub struct DriverContext {
     pub seed: u64,
     /// The joints; the first `joint_count` count.
     pub joints: [JointDescription; MAX_AXES],
-    /// Bit per digital input that the machine file expects of this driver.
+    /// Bit per digital input that the machine file reads from this driver, in the driver's own numbers: switches, index pulses, the probe,
+    /// named inputs.
     pub inputs: u64,
-    /// Bit per digital output that the machine file expects of this driver.
+    /// Bit per digital output that is this driver's: all of them where it has the whole machine (`[driver]`), whether anything switches
+    /// them or not.
     pub outputs: u64,
     /// Bit per analog input that the machine file expects of this driver.
     pub analog: u32,
-    /// 1 where the spindle is this driver's.
+    /// 1 where the spindle is this driver's, as that of the whole machine's driver is.
     pub spindle: u32,
     /// 1 where the loops run in real time. On the virtual clock, 0, what takes a simulated driver time costs the computer none.
     pub real_time: u32,
@@ -134,7 +136,8 @@ impl DriverContext {
     }
 }
 
-/// What a driver says of itself, whatever the machine.
+/// What a driver says of itself, whatever the machine; it may follow from its options. One whose bus can be emulated says then that it is
+/// simulated, and is judged and run without hardware.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct DriverDescription {

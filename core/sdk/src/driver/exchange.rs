@@ -12,7 +12,8 @@ pub const MAX_ANALOG: usize = 4;
 /// Number of digital inputs, and of outputs.
 pub const MAX_DIGITAL: usize = 64;
 
-/// The input edge that drives are to catch positions at.
+/// The input edge that drives are to catch positions at. Inputs have the driver's own numbers, from 0 in the order of its list. An index
+/// pulse is an input like others: its level may never be seen in [`Feedback::inputs`], and its edge is told by a [`Latch`] alone.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(C)]
 pub struct Arm {
@@ -38,7 +39,8 @@ pub struct Setpoint {
     /// Bit per joint that is being homed with a torque limit: its drive keeps to
     /// [`crate::JointDescription::homing_torque_percent`], and has its own limit back where the bit is 0.
     pub limited: u32,
-    /// Number of the fine period.
+    /// Number of the fine period. It is 0 while joints are enabled for the first time, and where it does not grow the host has not made
+    /// a new setpoint: drives that watch their host go by that. What takes its time, as a brake, is counted in exchanges.
     pub tick: u64,
     /// Digital outputs, bit n is output n.
     pub outputs: u64,
@@ -86,7 +88,8 @@ impl Default for Setpoint {
     }
 }
 
-/// A position caught by the drives on an input edge that was armed.
+/// A position caught by the drives on an input edge that was armed. A driver tells it in one exchange and clears it in the next; one
+/// that was there before the edge was armed, and has not changed since, does not count.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
 pub struct Latch {
@@ -97,7 +100,7 @@ pub struct Latch {
     /// Bit per joint whose position was caught; the position of another one is not read.
     pub joints: u32,
     /// How long before the feedback of this exchange was taken the edge came, s; positions that were not caught are found between
-    /// the feedback of this period and of those before by it.
+    /// the feedback of this period and of those before by it. Drives without a time stamp take it from the speed, or leave 0.
     pub before_s: f64,
     /// Positions per joint at the edge, mm or rad.
     pub position: AxisVector,

@@ -111,10 +111,13 @@ pub trait Driver: Send {
     fn exchange(&mut self, setpoint: &Setpoint, feedback: &mut Feedback)
     -> Result<(), PluginError>;
 
-    /// Bring the drives to rest by their own means, now. Fine loop: no allocation.
+    /// Bring the drives to rest by their own means, now: a fault has been answered by setpoints that came to rest, or could not be.
+    /// Exchanges go on; the drives are [`JointState::QuickStop`] until they rest, follow no setpoint, and are enabled again only
+    /// after an exchange with `enable = 0`, or with `reset = 1`. Fine loop: no allocation.
     fn quick_stop(&mut self);
 
-    /// Leaves the drives without torque and lets go of the bus; `start` may follow. Host; may allocate.
+    /// Leaves the drives without torque and ends what [`Driver::start`] began; what [`Driver::open`] claimed is kept, for `start` may
+    /// follow. Outputs stay as the last setpoint has them. Host; may allocate.
     ///
     /// # Errors
     /// What could not be released or written: a run that was good so far ends with this as its fault.

@@ -72,10 +72,11 @@ impl Layout for JointState {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct Attached {
-    /// Bit per joint whose position is known: an absolute encoder, or the same power-on as when it was homed. The position of
-    /// another one counts from wherever it stood at power-on.
+    /// Bit per joint whose position is known: an absolute encoder. The position of another one counts from wherever it stood at
+    /// power-on; that it has been homed by a switch since then is what the host remembers.
     pub known: u32,
-    /// Bit per joint whose drive says that it is homed.
+    /// Bit per joint whose drive says that it is homed, by a method of its own. A joint that is known or homed may be moved by programs:
+    /// where neither holds, both bits are cleared ([`Attached::counting_from_power_on`]).
     pub homed: u32,
     /// Position per joint, mm or rad.
     pub position: AxisVector,
@@ -101,7 +102,7 @@ layout!(Attached {
 pub const MAX_DELAY_PERIODS: u32 = 15;
 
 impl Attached {
-    /// Joints that stand at `position` and know it, disabled, without delay. Any loop; does not allocate.
+    /// Joints that stand at `position` and know it, as absolute encoders do, disabled, without delay. Any loop; does not allocate.
     pub fn at(position: AxisVector) -> Self {
         Self {
             known: u32::MAX,
@@ -110,6 +111,17 @@ impl Attached {
             state: [JointState::Disabled; MAX_AXES],
             fault_code: [0; MAX_AXES],
             delay_periods: [0; MAX_AXES],
+        }
+    }
+}
+
+impl Attached {
+    /// Joints that stand at `position` as counted from power-on, and know no more: they have to be homed. Any loop; does not allocate.
+    pub fn counting_from_power_on(position: AxisVector) -> Self {
+        Self {
+            known: 0,
+            homed: 0,
+            ..Self::at(position)
         }
     }
 }

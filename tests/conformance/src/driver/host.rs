@@ -5,6 +5,7 @@ use tandem_sdk::{
     Setpoint,
 };
 
+use super::pace::Pace;
 use super::watch::{STANDS_MM, Watch};
 use super::{Failed, JOINTS, context};
 use crate::heap;
@@ -36,6 +37,8 @@ pub struct Host<'a> {
     has_faulted: bool,
     bits: Vec<u64>,
     heap_uses: u64,
+    /// None where nothing moves: a period then takes as long as its exchange.
+    pace: Option<Pace>,
 }
 
 fn failed(method: &str) -> impl FnOnce(PluginError) -> Failed {
@@ -56,7 +59,13 @@ impl<'a> Host<'a> {
             has_faulted: false,
             bits: Vec::new(),
             heap_uses: 0,
+            pace: None,
         }
+    }
+
+    /// From here on a fine period takes as long as it says.
+    pub fn keep_to_the_clock(&mut self, pace: Pace) {
+        self.pace = Some(pace);
     }
 
     /// The bits of all positions, and how often the heap was used.
@@ -71,7 +80,9 @@ impl<'a> Host<'a> {
     }
 
     pub fn open(&mut self) -> Result<(), Failed> {
-        self.driver.open(&context()).map_err(failed("open"))
+        self.driver
+            .open(&context(self.pace.is_some()))
+            .map_err(failed("open"))
     }
 
     /// Brings the bus up, and judges what the driver says of its joints.
@@ -142,6 +153,9 @@ impl<'a> Host<'a> {
 
     /// One fine period without a new tick.
     fn exchange_again(&mut self) -> Result<(), Failed> {
+        if let Some(pace) = &mut self.pace {
+            pace.wait();
+        }
         let before = heap::uses();
         let (driver, setpoint, feedback) = (&mut *self.driver, &self.setpoint, &mut self.feedback);
         let answer = self.timing.of(|| driver.exchange(setpoint, feedback));

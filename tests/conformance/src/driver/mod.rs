@@ -1,6 +1,7 @@
 //! Drivers: a whole life as the host leads it, and calls out of order.
 
 mod host;
+mod pace;
 mod watch;
 
 use tandem_sdk::{
@@ -13,6 +14,7 @@ use crate::report::Report;
 use crate::timing::Timing;
 use crate::{Setup, heap};
 use host::Host;
+use pace::Pace;
 
 const JOINTS: usize = 3;
 
@@ -77,13 +79,14 @@ fn judge_order(plugin: Plugin, setup: &Setup, report: &mut Report) {
     };
     driver.quick_stop();
     let mut feedback = Feedback::default();
-    let mut answers = vec![("check", driver.check(&context()))];
+    let context = context(driver.describe().simulated == 0);
+    let mut answers = vec![("check", driver.check(&context))];
     answers.push((
         "exchange before open",
         driver.exchange(&Setpoint::default(), &mut feedback),
     ));
     answers.push(("start before open", driver.start().map(|_| ())));
-    answers.push(("open", driver.open(&context())));
+    answers.push(("open", driver.open(&context)));
     answers.push((
         "exchange before start",
         driver.exchange(&Setpoint::default(), &mut feedback),
@@ -105,8 +108,9 @@ fn judge_order(plugin: Plugin, setup: &Setup, report: &mut Report) {
     }
 }
 
-fn context() -> DriverContext {
+fn context(real_time: bool) -> DriverContext {
     let mut context = DriverContext::new(JOINTS, FINE_PERIOD_S);
+    context.real_time = u32::from(real_time);
     context.start_position = AxisVector::from_slice(&[1.0, -2.0, 3.0]);
     context
 }
@@ -115,7 +119,11 @@ fn context() -> DriverContext {
 fn live(mut driver: Box<dyn Driver>, report: &mut Report, timing: &mut Timing) -> Option<Vec<u64>> {
     const CHECK: &str = "lifecycle";
     report.judged(CHECK);
+    let moves_metal = driver.describe().simulated == 0;
     let mut host = Host::new(driver.as_mut(), report, timing);
+    if moves_metal {
+        host.keep_to_the_clock(Pace::new());
+    }
     let answer = host
         .open()
         .and_then(|()| first_day(&mut host))
@@ -126,7 +134,7 @@ fn live(mut driver: Box<dyn Driver>, report: &mut Report, timing: &mut Timing) -
         report.find(check, format!("{method}: {error}"));
         return None;
     }
-    judge_words(driver.as_ref(), report);
+    judge_words(driver.as_ref(), moves_metal, report);
     if !heap::counts() {
         report.skip("allocation", heap::NOT_COUNTED);
     } else if heap_uses > 0 {
@@ -175,14 +183,14 @@ fn days_after(host: &mut Host<'_>) -> Result<(), Failed> {
 }
 
 /// Any code may be asked for.
-fn judge_words(driver: &dyn Driver, report: &mut Report) {
+fn judge_words(driver: &dyn Driver, real_time: bool, report: &mut Report) {
     const CHECK: &str = "words for codes";
     report.judged(CHECK);
     for code in [0, 1, 0x7210, 0xDEAD_BEEF, u32::MAX] {
         let _words = driver.explain(0, code);
     }
     // What has panicked is not asked again, and says so.
-    if let Err(error) = driver.check(&context())
+    if let Err(error) = driver.check(&context(real_time))
         && error.is_panic()
     {
         report.find(CHECK, error.to_string());

@@ -53,7 +53,7 @@ pub(crate) fn refuse_incompatible(line: &Line) -> Checked<()> {
                 "{} does not go with {word}: G40 must come before",
                 other.code
             );
-            Err(line.motion_fault("compensation", message))
+            Err(line.motion_error("compensation", message))
         }
         _ => Ok(()),
     }

@@ -282,7 +282,7 @@ pub(crate) fn straight(line: &mut Line, kind: BlockKind) -> Checked<()> {
         let at = plane.map(|axis| line.state.path.last_end[axis]);
         if distance(at, to) <= radius_mm {
             let message = "the first move with radius compensation must be longer than the radius of the tool";
-            return Err(entry_fault(line, message));
+            return Err(entry_error(line, message));
         }
         at
     } else {
@@ -345,14 +345,14 @@ pub(crate) fn bent(line: &mut Line, ends: &Ends, parts: &Parts, plane: [usize; 2
         if distance(at, ends.end) <= radius_mm {
             let message =
                 "the first arc with radius compensation must be longer than the radius of the tool";
-            return Err(entry_fault(line, message));
+            return Err(entry_error(line, message));
         }
         // The arc that leaves from where the tool stands, and ends beside the end in the same direction.
         let towards = unit(end, center);
         let cosine = dot(unit(end, at), towards);
         let out = distance(end, at) / 2.0 / cosine;
         if !out.is_finite() || cosine.abs() < NO_MOVE {
-            return Err(entry_fault(
+            return Err(entry_error(
                 line,
                 "the tool cannot enter by this arc: its radius is too large for it",
             ));
@@ -365,7 +365,7 @@ pub(crate) fn bent(line: &mut Line, ends: &Ends, parts: &Parts, plane: [usize; 2
                 crate::line_error::show(first.arc.radius_mm),
                 crate::line_error::show(radius_mm)
             );
-            return Err(drawn(line, line.motion_fault("compensation", message)));
+            return Err(drawn(line, line.motion_error("compensation", message)));
         }
         let offset_mm = if inside {
             first.arc.radius_mm - radius_mm
@@ -397,8 +397,8 @@ fn pass(line: &mut Line) -> Checked<()> {
     Ok(())
 }
 
-fn entry_fault(line: &Line, message: &str) -> LineError {
-    line.motion_fault("compensation", message)
+fn entry_error(line: &Line, message: &str) -> LineError {
+    line.motion_error("compensation", message)
 }
 
 /// The feed of a move whose programmed length in the plane is `length_mm`.
@@ -480,7 +480,7 @@ fn keep(line: &mut Line, held: Held) -> Checked<()> {
         let message = format!(
             "more than {MAX_HELD} moves and events stand between two moves in the plane with radius compensation"
         );
-        return Err(line.motion_fault("compensation", message));
+        return Err(line.motion_error("compensation", message));
     }
     line.state.compensation.held.push(held);
     Ok(())
@@ -667,7 +667,7 @@ fn check_end(line: &Line, plane: [usize; 2], block: &Block) -> Checked<()> {
     Ok(())
 }
 
-/// Says which line a error belongs to, that shows only in a later one.
+/// Says which line an error belongs to that shows only in a later one.
 fn beside_line(mut error: LineError, line: u32) -> LineError {
     let _ = write!(
         error.message,

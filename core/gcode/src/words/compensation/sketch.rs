@@ -52,10 +52,10 @@ pub(super) fn gouge(line: &Line, of: u32, why: &str) -> LineError {
         "with {word} and a tool of radius {radius} mm the moves of the lines {of} and {now} cannot be driven: {why}; a smaller \
          tool, or another path"
     );
-    drawn(line, line.motion_fault("gouge", message))
+    drawn(line, line.motion_error("gouge", message))
 }
 
-/// A error with the moves around the corner, and the tool beside it.
+/// An error with the moves around the corner, and the tool beside it.
 #[cold]
 pub(super) fn drawn(line: &Line, mut error: LineError) -> LineError {
     let compensation = &line.state.compensation;

@@ -19,7 +19,7 @@ pub(super) fn cubic(line: &mut Line) -> Checked<()> {
     let [x, y] = bezier_axes(line)?;
     let p = offset(line, b'P').zip(offset(line, b'Q'));
     let Some((p, q)) = p else {
-        return Err(line.motion_fault(
+        return Err(line.motion_error(
             "nurbs",
             "G5 needs P and Q, the third control point from the end",
         ));
@@ -35,9 +35,9 @@ pub(super) fn cubic(line: &mut Line) -> Checked<()> {
         (None, None, Some((_, [p, q]))) => [-p, -q],
         (None, None, None) => {
             let why = "G5 needs I and J, the second control point from the start: only a G5 behind another may lack them";
-            return Err(line.motion_fault("nurbs", why));
+            return Err(line.motion_error("nurbs", why));
         }
-        _ => return Err(line.motion_fault("nurbs", "G5 takes I and J both or neither")),
+        _ => return Err(line.motion_error("nurbs", "G5 takes I and J both or neither")),
     };
     let (start, end) = (line.state.path.last_end, line.state.path.block_end());
     let (mut second, mut third) = (start, end);
@@ -57,7 +57,7 @@ pub(super) fn quadratic(line: &mut Line) -> Checked<()> {
     let [x, y] = bezier_axes(line)?;
     let (i, j) = (offset(line, b'I'), offset(line, b'J'));
     if i.is_none() && j.is_none() {
-        return Err(line.motion_fault(
+        return Err(line.motion_error(
             "nurbs",
             "G5.1 needs I or J, the middle control point from the start",
         ));
@@ -79,10 +79,10 @@ fn bezier_axes(line: &Line) -> Checked<[usize; 2]> {
     line.refuse_machine_coordinates()?;
     match (line.letters.axis(b'X'), line.letters.axis(b'Y')) {
         _ if line.state.modes.plane != Plane::Xy => {
-            Err(line.motion_fault("nurbs", "G5 and G5.1 need the plane XY (G17)"))
+            Err(line.motion_error("nurbs", "G5 and G5.1 need the plane XY (G17)"))
         }
         (Some(x), Some(y)) => Ok([x, y]),
-        _ => Err(line.motion_fault("axis", "G5 and G5.1 need the axes X and Y")),
+        _ => Err(line.motion_error("axis", "G5 and G5.1 need the axes X and Y")),
     }
 }
 

@@ -58,7 +58,7 @@ pub(super) fn linuxcnc_line(line: &mut Line, curve: &mut Curve) -> Checked<bool>
     only(line, "NPLXYZABCUVW")?;
     if line.words.present & AXIS_MASK == 0 {
         let why = "a line between G5.2 and G5.3 gives a control point: its axis words are missing";
-        return Err(first_fault(line, why));
+        return Err(first_error(line, why));
     }
     linuxcnc_order(line, curve)?;
     let weight = weight_of(line, b'P')?;
@@ -94,7 +94,7 @@ fn enough_points(line: &Line, curve: &Curve, order: usize) -> Checked<()> {
         "the curve that line {opened} opens has {points} control points (the position before it is one), \
          order {order} needs {order}"
     );
-    Err(first_fault(line, &message))
+    Err(first_error(line, &message))
 }
 
 /// The line with G06.2: order, first knot, and the first control point, which is the programmed position.
@@ -158,7 +158,7 @@ pub(super) fn fanuc_line(line: &mut Line, curve: &mut Curve) -> Checked<bool> {
         return Ok(alone + 1 == order);
     }
     if alone > 0 {
-        return Err(first_fault(
+        return Err(first_error(
             line,
             "a control point after knots that stand alone: those end the curve",
         ));
@@ -172,7 +172,7 @@ pub(super) fn fanuc_line(line: &mut Line, curve: &mut Curve) -> Checked<bool> {
 /// The knot of the line, checked against those before it.
 fn knot(line: &Line, curve: &mut Curve) -> Checked<()> {
     let Some(knot) = line.words.get(b'K') else {
-        return Err(first_fault(line, "K, the knot of this line, is missing"));
+        return Err(first_error(line, "K, the knot of this line, is missing"));
     };
     let order = curve.order.unwrap_or(FANUC_ORDER);
     let index = curve.knots.len();
@@ -271,8 +271,8 @@ fn only(line: &Line, letters: &str) -> Checked<()> {
     Err(LineError::new(span, "unused-word", message))
 }
 
-/// A error at the first word of the line.
-fn first_fault(line: &Line, message: &str) -> LineError {
+/// An error at the first word of the line.
+fn first_error(line: &Line, message: &str) -> LineError {
     let span = line.words.g.as_slice().first().map(|code| code.span);
     let word = line.words.first_of(u32::MAX).map(|(_, span)| span);
     LineError::new(span.or(word).unwrap_or_default(), "nurbs", message)

@@ -310,7 +310,7 @@ fn close_curve(line: &mut Line, mut curve: Curve) -> Checked<()> {
 fn push_curve(line: &mut Line, origin: &Origin, data: NurbsData) -> Checked<()> {
     let made = Nurbs::new(&data, &line.config.axes);
     let curve =
-        made.map_err(|error| origin.blame(curve_fault(line, origin.line, &error), &error, &data))?;
+        made.map_err(|error| origin.blame(curve_error(line, origin.line, &error), &error, &data))?;
     check_curve_travel(line, &curve, origin)?;
     let length_mm = curve.length().mm;
     let feed_mm_per_s = match origin.inverse_time {
@@ -336,13 +336,13 @@ fn push_curve(line: &mut Line, origin: &Origin, data: NurbsData) -> Checked<()> 
     Ok(())
 }
 
-fn curve_fault(line: &Line, opened: u32, error: &NurbsError) -> LineError {
+fn curve_error(line: &Line, opened: u32, error: &NurbsError) -> LineError {
     let message = if opened == line.state.line {
         error.to_string()
     } else {
         format!("the curve that line {opened} opens: {error}")
     };
-    line.motion_fault("nurbs", message)
+    line.motion_error("nurbs", message)
 }
 
 /// Whether a linear axis moves.
