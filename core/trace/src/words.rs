@@ -123,3 +123,46 @@ impl Shape {
 
 // `take` hands out both positions and signals.
 const _: () = assert!(MAX_AXES == MAX_SIGNALS);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shape(axes: usize) -> Shape {
+        Shape {
+            axes,
+            signals: 0,
+            switched: true,
+            aged: true,
+        }
+    }
+
+    /// What is nearly equal is stored as the difference, which is short: the feedback of an axis beside its own command.
+    #[test]
+    fn a_feedback_is_stored_beside_the_command_of_its_axis() {
+        for axes in 1..=MAX_AXES {
+            let words = 0..shape(axes).words();
+            let found: Vec<_> = words
+                .filter_map(|word| shape(axes).command_of(word).map(|command| (word, command)))
+                .collect();
+            let expected: Vec<_> = (0..axes).map(|axis| (4 + axes + axis, 4 + axis)).collect();
+            assert_eq!(found, expected, "{axes} axes");
+        }
+    }
+
+    /// The age is that of the oldest, and belongs to the axes that there are.
+    #[test]
+    fn the_age_of_the_oldest_feedback_comes_back_for_every_axis_there_is() {
+        for axes in 1..MAX_AXES {
+            let mut sample = Sample::default();
+            sample.age_periods[axes - 1] = 3;
+            sample.age_periods[axes] = 9;
+            let (read, _) = shape(axes)
+                .to_sample(&shape(axes).to_words(&sample, &[]))
+                .unwrap();
+            let expected: [u32; MAX_AXES] =
+                std::array::from_fn(|axis| if axis < axes { 3 } else { 0 });
+            assert_eq!(read.age_periods, expected, "{axes} axes");
+        }
+    }
+}

@@ -31,10 +31,44 @@ proptest! {
 fn the_header_survives() {
     let header = header(8, 8);
     let bytes = written(&header, &[]);
-    assert_eq!(
-        tandem_trace::Reader::new(&bytes[..]).unwrap().header(),
-        &header
-    );
+    let reader = tandem_trace::Reader::new(&bytes[..]).unwrap();
+    assert_eq!(reader.header(), &header);
+    assert_eq!(reader.format(), tandem_trace::FORMAT);
+}
+
+/// What a format does not have is not looked for in it.
+#[test]
+fn what_is_switched_came_with_format_3_and_the_age_with_4() {
+    let has = |format| {
+        (
+            tandem_trace::has_switched(format),
+            tandem_trace::has_age(format),
+        )
+    };
+    assert_eq!(has(2), (false, false));
+    assert_eq!(has(3), (true, false));
+    assert_eq!(has(4), (true, true));
+}
+
+/// Gives nothing every other time, as a system call does that a signal has interrupted.
+struct Interrupted<'a>(&'a [u8], bool);
+
+impl io::Read for Interrupted<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.1 = !self.1;
+        if self.1 {
+            return Err(io::ErrorKind::Interrupted.into());
+        }
+        self.0.read(buffer)
+    }
+}
+
+#[test]
+fn a_reading_that_is_interrupted_goes_on() {
+    let bytes = written(&header(2, 0), &[]);
+    let reader = tandem_trace::Reader::new(Interrupted(&bytes, false)).unwrap();
+    assert_eq!(reader.header(), &header(2, 0));
+    assert_eq!(reader.map(Result::unwrap).count(), 0);
 }
 
 #[test]
