@@ -380,3 +380,47 @@ fn between_two_samples_counts_what_turns_the_motion() {
     assert_near(bulge(1e-12, [1.0, 1.0]), 100.0);
     assert_near(bulge(0.5, [0.0, 1.0]), 1.0 + 2.0 + 20.0);
 }
+
+/// Along X in pieces of a quarter of a period, one of which turns: of the middle of piece 6 those from 2 to 10 lie within a period.
+#[test]
+fn between_two_samples_counts_what_lies_within_a_period_in_pieces_that_are_shorter() {
+    const PIECES: u32 = 13;
+    const NEAR: usize = 6;
+    const PIECE_S: f64 = PERIOD_S / 4.0;
+    const FAST: f64 = 1e6;
+    let along_x = || {
+        let mut window = Window::<2>::new();
+        for n in 0..PIECES {
+            let start_s = f64::from(n) * PIECE_S;
+            let mut piece = Piece::between(&[[0.0; 2]; 3], &[[0.0; 2]; 3], start_s, PIECE_S);
+            piece.c[0] = [FAST * start_s, 0.0];
+            piece.c[1] = [FAST, 0.0];
+            window.pieces.push(piece);
+        }
+        window
+    };
+    let bulge = |window: &Window<2>, bends: Vec<f64>| {
+        let jerks = vec![1e12; bends.len()];
+        let checker = Checker::<2> {
+            bends,
+            jerks,
+            ..Checker::default()
+        };
+        let t = (NEAR as f64 + 0.5) * PIECE_S;
+        checker.bulge_around(window, NEAR, t, PERIOD_S) / (PERIOD_S * PERIOD_S / 8.0)
+    };
+    for n in 0..PIECES as usize {
+        let is_within = (2..=10).contains(&n);
+        let mut window = along_x();
+        window.pieces[n].c[2][1] = 25.0;
+        let across = bulge(&window, vec![1000.0; PIECES as usize]);
+        assert_near(across, if is_within { 50.0 } else { 0.0 });
+        // The motion is at a twentieth of its speed across X in one piece: as much of the largest acceleration counts.
+        let mut window = along_x();
+        window.pieces[NEAR].c[1][1] = FAST / 20.0;
+        let mut bends = vec![100.0; PIECES as usize];
+        bends[n] = 1000.0;
+        let turned = bulge(&window, bends);
+        assert_near(turned, if is_within { 50.0 } else { 5.0 });
+    }
+}
