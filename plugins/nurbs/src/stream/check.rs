@@ -446,3 +446,50 @@ pub fn jerk_share(bounds: &Bounds, at: &AlongPath, [v, a, j]: [f64; 3]) -> f64 {
     });
     shares.fold(0.0, f64::max)
 }
+
+#[cfg(test)]
+mod tests {
+    use tandem_rig::{axis, context};
+    use tandem_sdk::{Block, NurbsData};
+
+    use super::super::queue::Queue;
+    use super::*;
+    use crate::course::Course;
+
+    /// A curve that stands further off its chord at a quarter than in the middle, by an eighth: where the middle is near the chord
+    /// error its quarters count too, and where it is far below that alone.
+    #[test]
+    fn where_the_middle_is_near_the_chord_error_its_quarters_count() {
+        const CHORD_ERROR_MM: f64 = 1e-3;
+        for (middle, expected) in [(0.9, 0.9 * 1.125), (0.7, 0.7)] {
+            let bounds = Bounds {
+                context: context(&[axis(1000.0); 2], 1e-3),
+                chord_error_mm: CHORD_ERROR_MM,
+            };
+            // Of y = 3·a·t·(1 − t)² the middle is 3/8 of a.
+            let a_mm = middle * CHORD_ERROR_MM * 8.0 / 3.0;
+            let points = [[0.0, 0.0], [1.0 / 3.0, a_mm], [2.0 / 3.0, 0.0], [1.0, 0.0]];
+            let data = NurbsData {
+                degree: 3,
+                control_points: points.map(|p| AxisVector::from_slice(&p)).to_vec(),
+                weights: vec![1.0; 4],
+                knots: vec![0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0],
+            };
+            let block = Block {
+                end: data.control_points[3],
+                kind: BlockKind::Nurbs,
+                length_mm: 1.0,
+                feed_mm_per_s: 1.0,
+                ..Block::at(data.control_points[0])
+            };
+            let course = Course::new(&bounds.context, &block, Some(data.curve())).unwrap();
+            let mut queue = Queue::default();
+            queue.push(&block, course, &bounds);
+            let route = queue.route().unwrap();
+            let ends = [data.control_points[0], data.control_points[3]];
+            let off_mm = chord_error_mm(&route, &bounds, (0.0, 1.0), &ends, 0.01);
+            let share = off_mm / CHORD_ERROR_MM;
+            assert!((share - expected).abs() < 1e-3, "{share} for {middle}");
+        }
+    }
+}

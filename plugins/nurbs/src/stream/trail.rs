@@ -461,6 +461,48 @@ mod tests {
         phases
     }
 
+    /// Two periods behind a rest samples show little of the jerk with which a motion begins, and the tick begins anew there: the jerk
+    /// itself counts, and from three periods before on. Behind a motion no sample shows it.
+    #[test]
+    fn the_jerk_behind_a_rest_counts_itself() {
+        const PATH_MM: f64 = 7.0;
+        let mut limits = axis(1e9);
+        limits.jerk_mm_per_s3 = JERK;
+        limits.feed_mm_per_s = 1e9;
+        let bounds = Bounds {
+            context: context(&[limits], PERIOD_S),
+            chord_error_mm: 0.01,
+        };
+        for (share, speed, expected) in [(1.02, 0.0, 1.02), (1.004, 0.0, 0.0), (1.02, 1e-3, 0.0)] {
+            let mut before = Segment::rest(&AxisVector::ZERO, 4.0 * PERIOD_S);
+            before.path = [PATH_MM, 1.0 / PERIOD_S, 0.0, 0.0, 0.0, 0.0];
+            before.coefficients[0][1] = speed;
+            let mut head = Segment::rest(&AxisVector::ZERO, 2.0 * PERIOD_S);
+            head.path = [PATH_MM + 4.0, 1.0 / PERIOD_S, 0.0, 0.0, 0.0, 0.0];
+            head.coefficients[0] = [
+                4.0 * PERIOD_S * speed,
+                speed,
+                0.0,
+                share * JERK / 6.0,
+                0.0,
+                0.0,
+            ];
+            let mut trail = Trail::default();
+            trail.begin([before, head].iter(), &bounds);
+            let found = trail.judge(&bounds);
+            let jerk = found.worst.jerk;
+            assert!(
+                (jerk - expected).abs() < 1e-6,
+                "{share} at {speed} mm/s: {jerk}"
+            );
+            if expected > 0.0 {
+                let ends_mm = [found.from_mm, found.to_mm];
+                let apart = |n: usize, mm: f64| (ends_mm[n] - PATH_MM - mm).abs();
+                assert!(apart(0, 1.0) < 1e-9 && apart(1, 6.0) < 1e-9, "{ends_mm:?}");
+            }
+        }
+    }
+
     /// What samples at many phases show is what is found, and where they show too much lies in the range that is told.
     #[test]
     fn differences_are_those_of_samples_at_any_phase() {
