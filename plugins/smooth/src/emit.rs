@@ -120,16 +120,17 @@ impl<const L: usize> PathAhead<L> {
     }
 
     /// When the motion is over the block in front, which ends at the path coordinate `end`. Between two marks that is an even pace, and the
-    /// motion may be periods off; where the feed is another one behind it, it is when the motion passes the end of the block. What the
-    /// feed of a segment bounds is then on the block that has it.
+    /// motion may be periods off; where the feed is another one behind it, it is when the motion passes the end of the block, or where
+    /// the path turns back there moves away from it. What the feed of a segment bounds is then on the block that has it.
     fn over_s(&self, end: f64) -> f64 {
         let about_s = self.window.time_of(end);
-        let Some((vertex, direction)) = self.route.end_before_other_feed() else {
+        let Some(end) = self.route.end_before_other_feed() else {
             return about_s;
         };
         let is_before = |t: f64| {
-            let [position, ..] = self.window.state(t);
-            dot(&minus(&vertex, &position), &direction) > 0.0
+            let [position, velocity, _] = self.window.state(t);
+            let direction = end.direction.as_ref().unwrap_or(&velocity);
+            dot(&minus(&end.vertex, &position), direction) > 0.0
         };
         let starts_before = is_before(about_s);
         let step_s = if starts_before {

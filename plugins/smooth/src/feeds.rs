@@ -4,7 +4,7 @@ use tandem_motion::tube::{Lanes, Waypoint, each};
 
 use crate::frame::{dot, larger, minus};
 use crate::route::Run;
-use crate::window::{Start, Window};
+use crate::window::{Piece, Start, Window};
 
 /// The pace of intervals, asked for in order: the lowest of the chords whose waypoints lie in or next to one. A vertex has both
 /// of its chords: speed at the end of an interval is what the next one allows.
@@ -194,30 +194,45 @@ impl<'a, const L: usize> Feeder<'a, L> {
     }
 
     fn position(&self, window: &Window<L>, t: f64) -> Lanes<L> {
+        let (piece, t) = self.piece_at(window, t);
+        piece.position(t)
+    }
+
+    /// The piece in which the motion is, and the time in it.
+    fn piece_at<'w>(&self, window: &'w Window<L>, t: f64) -> (&'w Piece<L>, f64)
+    where
+        'a: 'w,
+    {
         let (window, t) = match self.old {
             Some((old, now_s)) if t < 0.0 => (old, now_s + t),
             _ => (window, t),
         };
         let piece = &window.pieces[window.piece_at(t)];
-        piece.position((t - piece.start_s).clamp(0.0, piece.duration_s))
+        (piece, (t - piece.start_s).clamp(0.0, piece.duration_s))
     }
 
     /// The chord that the motion is on: the marks know it to a few periods, and from there on it goes by the planes that halve the
-    /// angles at vertices, on either side of which one of the two chords is the nearer one.
+    /// angles at vertices, on either side of which one of the two chords is the nearer one. Where the path turns back, both are near on
+    /// either side, and a motion that cuts the corner may never pass the plane: it is on the second when it moves away from the vertex.
     fn chord_at(&self, window: &Window<L>, t: f64) -> usize {
         let chords = self.run.chords;
-        let at = self.position(window, t);
+        let (piece, piece_t) = self.piece_at(window, t);
+        let at = piece.position(piece_t);
         let is_passed = |vertex: usize| {
             let [before, behind] = [&chords[vertex - 1], &chords[vertex]];
             let way = minus(&at, &behind.start);
+            if before.turns_back_to(behind) {
+                return dot(&way, &piece.velocity(piece_t)) > 0.0;
+            }
             dot(&way, &before.direction) + dot(&way, &behind.direction) > 0.0
         };
-        let mut i = self.run.chord_at(window.along(t), self.chord);
-        while i + 1 < chords.len() && is_passed(i + 1) {
-            i += 1;
-        }
+        let marked = self.run.chord_at(window.along(t), self.chord);
+        let mut i = marked;
         while i > 0 && !is_passed(i) {
             i -= 1;
+        }
+        while i >= marked && i + 1 < chords.len() && is_passed(i + 1) {
+            i += 1;
         }
         i
     }
@@ -385,6 +400,39 @@ mod tests {
         ] {
             let share = share_of_feed(late_s);
             assert_eq!(share <= 1.0, passes, "{share} where it is {late_s} s late");
+        }
+    }
+
+    /// The path comes back beside itself, nearly along the chord before. The motion turns 0.1 mm before the vertex, and never passes the
+    /// plane between both chords, wherever the marks have it.
+    #[test]
+    fn a_motion_that_turns_back_is_on_the_second_chord_as_soon_as_it_has_turned() {
+        let mut chords = lines(&[[0.0, 0.0], [5.0, 0.0], [0.0, 0.02]]);
+        (chords[0].feed, chords[1].feed) = (50.0, 20.0);
+        let run = open(&chords);
+        let mut window = Window::<2>::new();
+        for (n, ends) in [[[1.0, 0.0], [4.9, -0.1]], [[4.9, -0.1], [3.0, -0.05]]]
+            .iter()
+            .enumerate()
+        {
+            let state = |at: [f64; 2]| [at, [ends[1][0] - ends[0][0], 0.0], [0.0; 2]];
+            let piece = Piece::between(&state(ends[0]), &state(ends[1]), n as f64, 1.0);
+            window.pieces.push(piece);
+        }
+        for late in [-1.0, 0.0, 1.0] {
+            window.marks = vec![
+                Mark { t: 0.0, s: 1.0 },
+                Mark {
+                    t: 1.0,
+                    s: 5.0 - late,
+                },
+                Mark { t: 2.0, s: 7.0 },
+            ];
+            let mut feeder = Feeder::new(&run, &[1.0; 2], 1e-3, &rest_at_start(), &window);
+            let ranges = [0, 1].map(|n| feeder.range(&window, n));
+            assert_eq!(ranges, [(20.0, 50.0), (20.0, 50.0)], "{late}");
+            let chords = [0.9, 1.1, 1.5].map(|t| feeder.chord_at(&window, t));
+            assert_eq!(chords, [0, 1, 1], "{late}");
         }
     }
 }
