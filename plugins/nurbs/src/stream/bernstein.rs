@@ -43,6 +43,33 @@ impl<const N: usize> Table<N> {
     };
 }
 
+/// Adds the Bernstein coefficients of the square of a polynomial to `sum`, which is of twice the degree.
+pub fn add_square<const N: usize, const M: usize>(coefficients: &[f64; N], sum: &mut [f64; M]) {
+    const { assert!(M + 1 == 2 * N) };
+    let [of_one, of_square] = [Binomials::<N>::ROW.as_slice(), &Binomials::<M>::ROW];
+    for (k, sum) in sum.iter_mut().enumerate() {
+        let first = (k + 1).saturating_sub(N);
+        let products = (first..=k.min(N - 1))
+            .map(|i| of_one[i] * of_one[k - i] * coefficients[i] * coefficients[k - i]);
+        *sum += products.sum::<f64>() / of_square[k];
+    }
+}
+
+/// How many ways there are to choose each number of N − 1.
+struct Binomials<const N: usize>;
+
+impl<const N: usize> Binomials<N> {
+    const ROW: [f64; N] = {
+        let mut row = [1.0; N];
+        let mut i = 1;
+        while i < N {
+            row[i] = row[i - 1] * (N - i) as f64 / i as f64;
+            i += 1;
+        }
+        row
+    };
+}
+
 /// The largest value of a polynomial by its Bernstein coefficients: not below it, and where it is above `enough` no more
 /// than 1e-9 of the coefficients above it.
 pub fn highest<const N: usize>(coefficients: &[f64; N], enough: f64) -> f64 {
@@ -86,6 +113,23 @@ fn higher<const N: usize>(coefficients: &[f64; N], enough: f64, close: f64, halv
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_square_of_a_polynomial_has_its_own_coefficients() {
+        let powers = [0.3, -1.2, 0.7, 2.0, -0.4];
+        let mut sum = [1.0; 9];
+        add_square(&bernstein(&powers, 1.5), &mut sum);
+        let mut squares = [0.0; 9];
+        squares[0] = 1.0;
+        for (i, a) in powers.iter().enumerate() {
+            for (j, b) in powers.iter().enumerate() {
+                squares[i + j] += a * b;
+            }
+        }
+        for (found, expected) in sum.iter().zip(bernstein(&squares, 1.5)) {
+            assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+        }
+    }
 
     fn value(powers: &[f64], t: f64) -> f64 {
         powers.iter().rev().fold(0.0, |sum, c| sum * t + c)

@@ -212,6 +212,7 @@ fn check_segments<M: Motion, N>(
         } else {
             0
         });
+        segment.feed_mm_per_s = ahead.front().block.command_feed_mm_per_s();
         let Drawn { until_s, leg_over } = draw(
             &ahead,
             bounds,

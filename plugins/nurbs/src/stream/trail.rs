@@ -11,13 +11,15 @@ use std::collections::VecDeque;
 use tandem_sdk::{MAX_AXES, Segment, SegmentFlags};
 
 use super::Bounds;
-use super::bernstein::{bernstein, largest};
+use super::bernstein::{add_square, bernstein, highest, largest};
 use super::check::Worst;
 
 /// Periods that the longest difference takes.
 const PERIODS: usize = 3;
 /// What rounding may add to a share.
 const ROUNDING: f64 = 1e-9;
+/// The same for the share of a feed, which the path by arc length takes too.
+const FEED_ROUNDING: f64 = 1e-7;
 /// Jerk at a rest as a share of its limit: there the tick begins anew, so the jerk itself is asked for and no difference. A
 /// segment follows the jerk of its path to 0.004.
 const AT_REST: f64 = 1.006;
@@ -36,6 +38,12 @@ struct Span {
     steps: [[f64; PERIODS]; MAX_AXES],
     rapid: bool,
     rests: bool,
+    /// Bit per axis whose speed a feed is here.
+    counted: u32,
+    /// Highest speed of these together, mm/s.
+    fastest_mm_per_s: f64,
+    /// Highest feed that may be asked for; infinite in rapid motion, mm/s.
+    feed_mm_per_s: f64,
 }
 
 /// What was found in the periods that end in a segment.
@@ -91,6 +99,17 @@ impl Trail {
         }
         let coefficients = segment.coefficients;
         let path = segment.path;
+        let counted = counted(segment, bounds);
+        let feed_mm_per_s = if rapid {
+            f64::INFINITY
+        } else {
+            segment.feed_mm_per_s * bounds.context.max_feed_ratio
+        };
+        let mut squares = [0.0; 9];
+        for (_, c) in lanes_of(counted, &coefficients) {
+            add_square(&bernstein(&rates(c)[0], segment.duration_s), &mut squares);
+        }
+        let fastest_mm_per_s = highest(&squares, feed_mm_per_s * feed_mm_per_s).sqrt();
         self.spans.push_back(Span {
             duration_s: segment.duration_s,
             coefficients,
@@ -99,6 +118,9 @@ impl Trail {
             steps,
             rapid,
             rests,
+            counted,
+            fastest_mm_per_s,
+            feed_mm_per_s,
         });
         let max_s = PERIODS as f64 * bounds.context.fine_period_s;
         let mut behind_s: f64 = self
@@ -116,7 +138,8 @@ impl Trail {
         }
     }
 
-    /// Every difference of samples that ends in the last segment, and velocity and acceleration at every point of it.
+    /// Every difference of samples that ends in the last segment, velocity and acceleration of the axes at every point of it, and the
+    /// way of every period by its feed.
     pub fn judge(&self, bounds: &Bounds) -> Found {
         let Some(head) = self.spans.back() else {
             return Found::default();
@@ -173,7 +196,58 @@ impl Trail {
                 }
             }
         }
+        self.judge_feed(bounds, &mut found);
         found
+    }
+
+    /// Whether a period that ends in the last segment goes farther than the feed allows. A segment follows the path within a few
+    /// nanometres, which is much of the way of a period where the feed is low.
+    fn judge_feed(&self, bounds: &Bounds, found: &mut Found) {
+        let period_s = bounds.context.fine_period_s;
+        let last = self.spans.len() - 1;
+        let (first, _) = self.back(last, 0.0, period_s);
+        let spans = &self.spans;
+        let inside = || spans.range(first..);
+        let rounding_mm_per_s: f64 = lanes_of(spans[last].counted, &spans[last].coefficients)
+            .map(|(_, c)| noise(c, 1, period_s))
+            .sum();
+        let allowed =
+            |feed_mm_per_s: f64| feed_mm_per_s * (1.0 + FEED_ROUNDING) + rounding_mm_per_s;
+        let fastest = inside().map(|span| span.fastest_mm_per_s);
+        let stepped_mm: f64 = inside()
+            .skip(1)
+            .flat_map(|span| lanes_of(span.counted, &span.steps))
+            .map(|(_, steps)| steps[0])
+            .sum();
+        let slowest = inside()
+            .filter(|span| !span.rests)
+            .map(|span| span.feed_mm_per_s);
+        if fastest.fold(0.0, f64::max) + stepped_mm / period_s
+            <= allowed(slowest.fold(f64::INFINITY, f64::min))
+        {
+            return;
+        }
+        self.each_stretch(1, period_s, |places, [done_s, step_s]| {
+            let [(to, _), (from, from_s), ..] = *places;
+            let touched = || spans.range(from..=to);
+            let feed = touched().map(|span| span.feed_mm_per_s).fold(0.0, f64::max);
+            let counted = touched().fold(u32::MAX, |all, span| all & span.counted);
+            if feed.is_infinite() {
+                return;
+            }
+            let mut squares = [0.0; 11];
+            for (lane, _) in lanes_of(counted, &spans[to].coefficients) {
+                let way = self.difference((lane, 1), places);
+                add_square(&bernstein(&way, step_s), &mut squares);
+            }
+            let most_mm = allowed(feed) * period_s;
+            let way_mm = highest(&squares, most_mm * most_mm).sqrt();
+            if way_mm > most_mm {
+                let from_mm = polynomial(&spans[from].path, from_s);
+                let to_mm = polynomial(&spans[to].path, done_s + step_s);
+                found.take_order(1, way_mm / (feed * period_s), [from_mm, to_mm], false);
+            }
+        });
     }
 
     /// What the periods before and in the last segment reach.
@@ -232,33 +306,10 @@ impl Trail {
         period_s: f64,
         found: &mut Found,
     ) {
-        const WEIGHTS: [[f64; PERIODS + 1]; PERIODS] = [
-            [1.0, -1.0, 0.0, 0.0],
-            [1.0, -2.0, 1.0, 0.0],
-            [1.0, -3.0, 3.0, -1.0],
-        ];
-        let last = self.spans.len() - 1;
-        let head = &self.spans[last];
-        let mut places: [(usize, f64); PERIODS + 1] =
-            std::array::from_fn(|n| self.back(last, 0.0, n as f64 * period_s));
+        let head = &self.spans[self.spans.len() - 1];
         let allowed = (limit * (1.0 + ROUNDING) + noise) * power(period_s, order);
-        let mut done_s = 0.0;
-        while done_s < head.duration_s {
-            // To the next place where one of the samples comes to the end of its segment.
-            let left = |(n, t_s): &(usize, f64)| self.spans[*n].duration_s - t_s;
-            let step_s = places[..=order]
-                .iter()
-                .map(left)
-                .fold(head.duration_s - done_s, f64::min)
-                .max(0.0);
-            let base = head.coefficients[lane][0];
-            let mut sum = [0.0; 6];
-            for ((n, t_s), weight) in places.iter().zip(WEIGHTS[order - 1]).take(order + 1) {
-                let shifted = shift(&self.spans[*n].coefficients[lane], base, *t_s);
-                for (sum, c) in sum.iter_mut().zip(shifted) {
-                    *sum += weight * c;
-                }
-            }
+        self.each_stretch(order, period_s, |places, [done_s, step_s]| {
+            let sum = self.difference((lane, order), places);
             let most = largest(&bernstein(&sum, step_s), allowed);
             if most > allowed {
                 let from_mm = polynomial(&self.spans[places[order].0].path, places[order].1);
@@ -270,6 +321,25 @@ impl Trail {
                     stepped,
                 );
             }
+        });
+    }
+
+    /// Stretch by stretch of the last segment, in which no sample of a difference of `order` that ends there enters another segment:
+    /// where these samples are when it begins, from the last one back, and the time in the segment and the duration of the stretch, s.
+    fn each_stretch(&self, order: usize, period_s: f64, mut look: impl FnMut(&Places, [f64; 2])) {
+        let last = self.spans.len() - 1;
+        let head = &self.spans[last];
+        let mut places: Places = std::array::from_fn(|n| self.back(last, 0.0, n as f64 * period_s));
+        let mut done_s = 0.0;
+        while done_s < head.duration_s {
+            // To the next place where one of the samples comes to the end of its segment.
+            let left = |(n, t_s): &(usize, f64)| self.spans[*n].duration_s - t_s;
+            let step_s = places[..=order]
+                .iter()
+                .map(left)
+                .fold(head.duration_s - done_s, f64::min)
+                .max(0.0);
+            look(&places, [done_s, step_s]);
             done_s += step_s;
             let mut moved = false;
             for (n, t_s) in &mut places {
@@ -286,6 +356,47 @@ impl Trail {
             }
         }
     }
+
+    /// The difference of `order` of a lane with its samples at `places`, by the powers of the time after these.
+    fn difference(&self, (lane, order): (usize, usize), places: &Places) -> [f64; 6] {
+        const WEIGHTS: [[f64; PERIODS + 1]; PERIODS] = [
+            [1.0, -1.0, 0.0, 0.0],
+            [1.0, -2.0, 1.0, 0.0],
+            [1.0, -3.0, 3.0, -1.0],
+        ];
+        let base = self.spans[places[0].0].coefficients[lane][0];
+        let mut sum = [0.0; 6];
+        for ((n, t_s), weight) in places.iter().zip(WEIGHTS[order - 1]).take(order + 1) {
+            let shifted = shift(&self.spans[*n].coefficients[lane], base, *t_s);
+            for (sum, c) in sum.iter_mut().zip(shifted) {
+                *sum += weight * c;
+            }
+        }
+        sum
+    }
+}
+
+/// The span and the time in it, s, of each sample of a difference, from the last one back.
+type Places = [(usize, f64); PERIODS + 1];
+
+/// The axes whose speed a feed is in a segment, a bit for each: the linear ones where any of them moves, else those that turn.
+fn counted(segment: &Segment, bounds: &Bounds) -> u32 {
+    let axes = &bounds.context.axes;
+    let of = |rotary: bool| {
+        (0..axes.count())
+            .filter(move |axis| axes.is_rotary(*axis) == rotary)
+            .fold(0, |bits, axis| bits | 1 << axis)
+    };
+    let linear = of(false);
+    let moves = lanes_of(linear, &segment.coefficients).any(|(_, c)| c[1..] != [0.0; 5]);
+    if moves { linear } else { of(true) }
+}
+
+/// Those of all lanes whose bit is set, with their number.
+fn lanes_of<T>(bits: u32, all: &[T; MAX_AXES]) -> impl Iterator<Item = (usize, &T)> {
+    all.iter()
+        .enumerate()
+        .filter(move |(lane, _)| bits >> lane & 1 == 1)
 }
 
 /// What lies in three periods.
@@ -408,6 +519,7 @@ mod tests {
         let segment = |n: usize| {
             let periods = if n == 0 { 3.0 } else { random.length(0.1, 3.0) };
             let mut segment = Segment::rest(&AxisVector::ZERO, periods * PERIOD_S);
+            segment.feed_mm_per_s = f64::INFINITY;
             let [position, speed, acceleration] = at;
             let jerk = random.between(-JERK, JERK);
             let changes = 1e7 * random.between(-1.0, 1.0);
@@ -553,5 +665,67 @@ mod tests {
             exceeded += usize::from(most[2] > 1.0);
         }
         assert!((30..=270).contains(&exceeded), "{exceeded}");
+    }
+
+    /// The way of a period of two axes together is what samples at many phases show, and between what path coordinates it is too long
+    /// is told. A rapid has no feed.
+    #[test]
+    fn the_way_of_a_period_is_that_of_samples_at_any_phase() {
+        const FEED_MM_PER_S: f64 = 0.3;
+        let mut random = Random::from_the_clock();
+        let mut limits = axis(1e9);
+        limits.jerk_mm_per_s3 = 1e12;
+        limits.feed_mm_per_s = 1e9;
+        let bounds = Bounds {
+            context: context(&[limits; 2], PERIOD_S),
+            chord_error_mm: 0.01,
+        };
+        let mut exceeded = 0;
+        for _ in 0..300 {
+            let mut along = drawn(&mut random);
+            let across = drawn(&mut random);
+            for (segment, other) in along.iter_mut().zip(&across) {
+                segment.feed_mm_per_s = FEED_MM_PER_S;
+                // The second axis takes as long as the first.
+                let slower = other.duration_s / segment.duration_s;
+                let mut power = 1.0;
+                segment.coefficients[1] = other.coefficients[0].map(|c| {
+                    let slowed = c * power;
+                    power *= slower;
+                    slowed
+                });
+            }
+            let mut trail = Trail::default();
+            trail.begin(along.iter(), &bounds);
+            let found = trail.judge(&bounds);
+            let across: Vec<Segment> = along.iter().map(turned).collect();
+            let mut most = 0.0_f64;
+            for t_s in phases(&along) {
+                let [way, other] = [&along, &across]
+                    .map(|segments| at(segments, t_s).0 - at(segments, t_s - PERIOD_S).0);
+                let share = way.hypot(other) / (FEED_MM_PER_S * PERIOD_S);
+                most = most.max(share);
+                if share > 1.0 + 1e-6 {
+                    let [to_mm, from_mm] = [t_s, t_s - PERIOD_S].map(|t_s| at(&along, t_s).1);
+                    assert!(found.from_mm < from_mm + 1e-9 && found.to_mm > to_mm - 1e-9);
+                }
+            }
+            let worst = found.worst.speed;
+            assert!(most < worst.max(1.0) + 1e-6, "{most} of {worst}");
+            assert!(worst < (1.02 * most).max(1.0), "{most} of {worst}");
+            exceeded += usize::from(most > 1.0);
+            let last = along.len() - 1;
+            along[last].flags = SegmentFlags::RAPID;
+            trail.begin(along.iter(), &bounds);
+            assert!(trail.judge(&bounds).worst.speed <= 1.0);
+        }
+        assert!((30..=270).contains(&exceeded), "{exceeded}");
+    }
+
+    /// The same with the second axis for the first.
+    fn turned(segment: &Segment) -> Segment {
+        let mut turned = *segment;
+        turned.coefficients.swap(0, 1);
+        turned
     }
 }
