@@ -200,6 +200,10 @@ impl<'a> Route<'a> {
             return (f64::INFINITY, break_mm - s_mm);
         }
         let ends = break_mm >= leg.end_mm;
+        // At a rest nothing is passed. Where a curve turns back there, its very end lies across the way to it.
+        if ends && !leg.joined {
+            return (f64::INFINITY, f64::INFINITY);
+        }
         let next = if ends {
             self.leg(cursor.leg + 1).filter(|_| leg.joined)
         } else {
