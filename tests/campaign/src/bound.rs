@@ -44,6 +44,7 @@ pub struct Bound<'a> {
     filter_s: f64,
     time_constant_s: f64,
     total_s: f64,
+    least_s: f64,
     dwell_s: f64,
     sways: Sways,
 }
@@ -53,6 +54,8 @@ pub struct Bound<'a> {
 pub struct Asks {
     /// The longest time that it may take, s, without what an operator does.
     pub time_s: f64,
+    /// A time that its lines need at the speeds of axes and joints, s, whoever drives them.
+    pub least_s: f64,
     /// How much its rotary axes turn beside the linear ones.
     pub sways: Sways,
 }
@@ -153,6 +156,7 @@ impl<'a> Bound<'a> {
             filter_s,
             time_constant_s: machine.motion.time_constant_s,
             total_s: 0.0,
+            least_s: 0.0,
             dwell_s: 0.0,
             sways: Sways::default(),
         };
@@ -173,6 +177,7 @@ impl<'a> Bound<'a> {
             + 20.0 * machine.rough_period_s;
         Ok(Asks {
             time_s,
+            least_s: bound.least_s,
             sways: bound.sways,
         })
     }
@@ -216,9 +221,38 @@ impl<'a> Bound<'a> {
             BlockKind::Nurbs => {
                 self.curve_s(block, curve.map_or(0, |curve| curve.control_points.len()))
             }
-            _ => self.straight_s(block, &moved),
+            _ => {
+                self.least_s += self.least_s(&moved);
+                self.straight_s(block, &moved)
+            }
         };
         self.total_s += moving_s + overhead_s;
+    }
+
+    /// The time that a line needs at the speed of its slowest axis or joint, s.
+    fn least_s(&self, moved: &[(usize, f64)]) -> f64 {
+        let by = |index: usize| {
+            let of_axis = moved.iter().find(|(axis, _)| *axis == index);
+            of_axis.map_or(0.0, |(_, by)| *by)
+        };
+        let axes = self.machine.axes.iter();
+        let of_axes = axes.map(|axis| by(axis.index) / axis.max_speed_mm_per_s());
+        let least_s = of_axes.fold(0.0, f64::max);
+        let Joints::Known(joints) = &self.machine.joints else {
+            return least_s;
+        };
+        let of_joints = joints.iter().filter_map(|joint| {
+            let Map::Sum(weights) = &joint.map else {
+                return None;
+            };
+            let parts = moved.iter().map(|(axis, by)| weights[*axis].abs() * by);
+            let (most, sum) = parts.fold((0.0, 0.0), |(most, sum), part| {
+                (f64::max(most, part), sum + part)
+            });
+            // The others may move it the other way.
+            Some((2.0 * most - sum) / joint.limits.max_speed_mm_per_s())
+        });
+        of_joints.fold(least_s, f64::max)
     }
 
     /// The speed of the axes that are moved, each at its highest, mm/s, or deg/s of rotary ones.

@@ -28,6 +28,8 @@ pub struct Ran {
     pub outcome: Option<Outcome>,
     /// Most samples that it was given.
     pub max_samples: usize,
+    /// Whether the program needs more than [`MAX_SAMPLES`] at the speeds of its axes and joints: it is judged as far as it came.
+    pub is_cut_off: bool,
     /// Most memory that the process had until the end of the run, MB.
     pub memory_mb: f64,
 }
@@ -111,6 +113,7 @@ pub fn drive(case: &Case, folder: &Path, registry: &Registry) -> Result<Driven, 
     forget_most_memory();
     let prepared = Run::prepare(machine.clone(), registry, parsed, Switches::default());
     let run = prepared.map_err(|refusal| Box::new(refused(&refusal)))?;
+    let least_samples = asks.least_s / machine.fine_period_s;
     let mut kept = Kept::new(&machine, max_samples, asks.sways, asked.max_ratio);
     let driven = catch_unwind(AssertUnwindSafe(|| {
         run.drive(Clock::Virtual, &asked.commands, &mut kept)
@@ -123,6 +126,7 @@ pub fn drive(case: &Case, folder: &Path, registry: &Registry) -> Result<Driven, 
         Err(panic) => resume_unwind(panic),
     };
     let ran = Ran {
+        is_cut_off: outcome.is_none() && least_samples > MAX_SAMPLES as f64,
         rows: kept.rows,
         longest_step_mm: kept.longest_step_mm,
         outcome,

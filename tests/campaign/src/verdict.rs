@@ -307,6 +307,8 @@ fn ended(ran: &Ran, asked: &Asked) -> Option<Report> {
         );
         let kind = if still {
             "standstill"
+        } else if ran.is_cut_off {
+            return None;
         } else if ran.max_samples == MAX_SAMPLES {
             "too-long"
         } else {
@@ -355,14 +357,18 @@ fn judged(
         rows: ran.rows.clone(),
         not_finite: vec![],
     };
-    let options = asked.options(judging, &trace, ran.longest_step_mm);
+    let mut options = asked.options(judging, &trace, ran.longest_step_mm);
+    options.ends_early |= ran.is_cut_off;
     let verdict = tandem_oracle::judge(&trace, &case.program, judging, &options);
     let found = |kind: Kind| {
         let rounded = |finding: &Finding| kind == Kind::Travel && size(finding) < ROUNDED_MM;
+        // A run that was ended in motion does not stop within a period.
+        let last = ran.rows.len().saturating_sub(1);
+        let is_end = |finding: &Finding| ran.is_cut_off && finding.sample == last;
         let of_kind = verdict
             .findings
             .iter()
-            .filter(move |finding| finding.kind == kind && !rounded(finding));
+            .filter(move |finding| finding.kind == kind && !rounded(finding) && !is_end(finding));
         let worst = of_kind.clone().max_by(|a, b| size(a).total_cmp(&size(b)))?;
         let count = of_kind.count();
         let words = format!("{count} samples, the worst: {}", words(worst));
