@@ -90,14 +90,9 @@ impl PowerOn {
 
 /// What a driver says of its joints where they stand at `position`: nothing is known of one that counts from power-on.
 pub(crate) fn attached(encoder: Encoder, position: AxisVector) -> Attached {
-    let at = Attached::at(position);
     match encoder {
-        Encoder::Absolute => at,
-        Encoder::Incremental => Attached {
-            known: 0,
-            homed: 0,
-            ..at
-        },
+        Encoder::Absolute => Attached::at(position),
+        Encoder::Incremental => Attached::counting_from_power_on(position),
     }
 }
 

@@ -79,7 +79,7 @@ impl Orders {
         LineError::new(self.words[group as usize].1, code, message)
     }
 
-    /// Sorts the words of a line; `modal` is the motion mode before it. After an error what is not at error is sorted
+    /// Sorts the words of a line; `modal` is the motion mode before it. After an error the other words are sorted
     /// all the same, so that reading can go on.
     #[inline]
     pub fn sort(&mut self, words: &LineWords, modal: MotionMode, letters: &Letters) -> Checked<()> {

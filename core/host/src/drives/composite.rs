@@ -5,8 +5,8 @@ use std::sync::atomic::AtomicUsize;
 use std::sync::atomic::Ordering::Relaxed;
 
 use tandem_sdk::{
-    Attached, Driver, DriverContext, DriverDescription, Feedback, JointState, Latch, MAX_AXES,
-    MAX_LATCHES, PluginError, Setpoint, Words,
+    Attached, AxisVector, Driver, DriverContext, DriverDescription, Feedback, JointState, Latch,
+    MAX_AXES, MAX_LATCHES, PluginError, Setpoint, Words,
 };
 
 use super::share::Share;
@@ -365,11 +365,7 @@ impl Driver for Composite {
     }
 
     fn start(&mut self) -> Result<Attached, PluginError> {
-        let mut attached = Attached {
-            known: 0,
-            homed: 0,
-            ..Attached::default()
-        };
+        let mut attached = Attached::counting_from_power_on(AxisVector::ZERO);
         for index in 0..self.parts.len() {
             let part = &mut self.parts[index];
             part.has_failed = false;

@@ -8,7 +8,7 @@ mod share;
 mod slow;
 
 use tandem_machine::{AxisHoming, DriverChoice, Machine};
-use tandem_sdk::{Attached, Driver, DriverContext, Name, PluginError, Words};
+use tandem_sdk::{Attached, AxisVector, Driver, DriverContext, Name, PluginError, Words};
 
 use crate::error::{HostError, refusal};
 use crate::joints::JointSpace;
@@ -115,11 +115,7 @@ impl Drives {
                 .open(&context)
                 .map_err(|e| made.refuses(machine, &e))?;
         }
-        let mut attached = Attached {
-            known: 0,
-            homed: 0,
-            ..Attached::default()
-        };
+        let mut attached = Attached::counting_from_power_on(AxisVector::ZERO);
         for index in 0..self.all.len() {
             let started = self.all[index].driver.start();
             match started {

@@ -117,7 +117,7 @@ pub trait Driver: Send {
     fn quick_stop(&mut self);
 
     /// Leaves the drives without torque and ends what [`Driver::start`] began; what [`Driver::open`] claimed is kept, for `start` may
-    /// follow. Outputs stay as the last setpoint has them. Host; may allocate.
+    /// follow. Host; may allocate.
     ///
     /// # Errors
     /// What could not be released or written: a run that was good so far ends with this as its fault.

@@ -113,9 +113,7 @@ impl Attached {
             delay_periods: [0; MAX_AXES],
         }
     }
-}
 
-impl Attached {
     /// Joints that stand at `position` as counted from power-on, and know no more: they have to be homed. Any loop; does not allocate.
     pub fn counting_from_power_on(position: AxisVector) -> Self {
         Self {
