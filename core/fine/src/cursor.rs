@@ -309,7 +309,7 @@ mod tests {
     use super::*;
     use crate::period_points::PeriodPoints;
     use rtrb::RingBuffer;
-    use tandem_sdk::{AxisLimits, MAX_AXES};
+    use tandem_sdk::{AxisLimits, Event, EventKind, MAX_AXES};
 
     /// A dwell of `dwell_s` as a planner emits it in rough periods of `rough_s`, behind a move that ends anywhere.
     fn dwell(dwell_s: f64, rough_s: f64, before_s: f64) -> Cursor {
@@ -468,6 +468,38 @@ mod tests {
         assert_eq!(cursor.advance(0.25, |_| false), Reached::Inside);
         assert_eq!((cursor.segment().block, cursor.epoch()), (7, 1));
         assert_eq!(cursor.program_time_s(), 0.75);
+    }
+
+    /// What was to be switched on the way that has been given up is not: events of this epoch are met, those of the one before are not.
+    #[test]
+    fn an_event_is_met_in_its_own_epoch_only() {
+        let (mut input, output) = RingBuffer::new(16);
+        for (epoch, outputs) in [(0, [1, 2]), (1, [3, 4])] {
+            for (block, output) in outputs.into_iter().enumerate() {
+                let mut event = Event::new(EventKind::DigitalOutput, 0, 0, output, 1.0);
+                event.epoch = epoch;
+                let mut segment = Segment::rest(&AxisVector::ZERO, 1.0);
+                segment.flags = SegmentFlags::default();
+                (segment.epoch, segment.block) = (epoch, block as u64);
+                let start_s = 0.0;
+                input.push(Queued::Event(event)).unwrap();
+                input.push(Queued::Segment { start_s, segment }).unwrap();
+            }
+        }
+        let mut cursor = Cursor::new(output, &AxisVector::ZERO);
+        let mut met = Vec::new();
+        let mut meet = |queued: &Queued| {
+            if let Queued::Event(event) = queued {
+                met.push(event.index);
+            }
+            false
+        };
+        cursor.advance(0.5, &mut meet);
+        cursor.end_epoch(&AxisVector::ZERO);
+        cursor.advance(0.5, &mut meet);
+        assert_eq!(cursor.epoch(), 1);
+        cursor.advance(1.0, &mut meet);
+        assert_eq!(met, [1, 3, 4]);
     }
 
     /// A motion at a feed that waits for no input is a cut; a dwell, a rapid and a probe are none.

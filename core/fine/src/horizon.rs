@@ -307,6 +307,45 @@ mod tests {
         assert!((room - 2..=room).contains(&points), "{points} of {room}");
     }
 
+    /// Places lie evenly from a place behind the period to the end of the reach, where that one counts too, in however many segments they are.
+    #[test]
+    fn places_ahead_lie_evenly_to_the_end_of_the_reach() {
+        // Shares of two, which add up without rounding.
+        const PERIOD_S: f64 = 1.0 / 1024.0;
+        for (spacing, lasts) in [
+            (1.0, 100.0),
+            (1.0, 11.5),
+            (1.0, 2.0),
+            (4.0, 100.0),
+            (4.0, 44.5),
+            (4.0, 0.5),
+        ] {
+            let step_s = spacing * PERIOD_S;
+            let axis = AxisLimits {
+                acceleration_mm_per_s2: Horizon::GRID as f64 * step_s,
+                jerk_mm_per_s3: 1.0,
+                ..AxisLimits::unlimited()
+            };
+            let (mut input, output) = RingBuffer::new(256);
+            for _ in 0..200 {
+                let mut segment = Segment::rest(&AxisVector::ZERO, lasts * PERIOD_S);
+                segment.flags = SegmentFlags::default();
+                let start_s = 0.0;
+                input.push(Queued::Segment { start_s, segment }).unwrap();
+            }
+            let mut cursor = Cursor::new(output, &AxisVector::ZERO);
+            let mut horizon = Horizon::new(&[axis; MAX_AXES], 1, PERIOD_S);
+            horizon.fill(&cursor.ahead(), PERIOD_S);
+            let seen: Vec<_> = horizon.iter().map(|point| point.offset_s).collect();
+            let behind: Vec<_> = seen.into_iter().filter(|s| *s > PERIOD_S).collect();
+            let expected: Vec<_> = (1..=Horizon::GRID)
+                .map(|n| PERIOD_S + n as f64 * step_s)
+                .filter(|s| *s <= Horizon::GRID as f64 * step_s)
+                .collect();
+            assert_eq!(behind, expected, "every {spacing}, segments of {lasts}");
+        }
+    }
+
     /// A plan that turns or gets faster by next to nothing of what its axes have goes straight on.
     #[test]
     fn straight_on_is_what_uses_next_to_nothing_of_the_limits() {

@@ -204,6 +204,31 @@ mod tests {
     }
 
     proptest! {
+        /// Without a limit of the change the shortest stop is the jerk one way and then the other: of one of the two orders the time that is
+        /// given brings both to nothing, whichever way the rate goes and however near its own ramp brings it to that.
+        #[test]
+        fn the_time_of_a_stop_is_that_of_the_jerk_one_way_and_then_the_other(
+            rate_digits in -3.0..3.0f64, of_ramp in -2.0..2.0f64, change in -100.0..100.0f64, jerk in 0.1..1000.0f64,
+            is_near in proptest::bool::ANY, is_rising in proptest::bool::ANY,
+        ) {
+            // Some rates are near those which the change alone brings to nothing.
+            let rate = if is_near {
+                of_ramp * change * change / (2.0 * jerk)
+            } else {
+                10f64.powf(rate_digits) * if is_rising { 1.0 } else { -1.0 }
+            };
+            let time_s = stop_s(rate, change, f64::INFINITY, jerk);
+            let most = rate.abs() + change * change / jerk;
+            let left = [-jerk, jerk].map(|first| {
+                let begins_s = (time_s - change / first) / 2.0;
+                let ends_s = time_s - begins_s;
+                let reached = change + first * begins_s;
+                let left = rate + f64::midpoint(change, reached) * begins_s + reached / 2.0 * ends_s;
+                if begins_s.min(ends_s) < -1e-9 * time_s { f64::INFINITY } else { left.abs() }
+            });
+            prop_assert!(left[0].min(left[1]) <= 1e-9 * most, "{left:?} of {most} left after {time_s} s");
+        }
+
         /// Whatever the deceleration, the feeds and the period are: the end speed is met at the place, never gone below on the
         /// way, and no period brakes harder than it may.
         #[test]

@@ -294,6 +294,23 @@ mod tests {
         assert_eq!(outputs.hand_over, Some((last, 2.0)));
     }
 
+    /// A program may say twice that an output is on, or off: the second time changes nothing.
+    #[test]
+    fn an_output_that_is_switched_as_it_is_stays_as_it_is() {
+        let mut outputs = Outputs::new(false, 0);
+        for on in [1.0, 1.0, 0.0, 0.0, 1.0] {
+            for (kind, index) in [
+                (EventKind::Mist, 0),
+                (EventKind::Flood, 0),
+                (EventKind::DigitalOutput, 9),
+            ] {
+                outputs.apply(&Event::new(kind, 1, 0, index, on), Waits::default());
+            }
+            let switched = 1 << MIST | 1 << FLOOD | 1 << 9;
+            assert_eq!(outputs.bits, if on == 1.0 { switched } else { 0 });
+        }
+    }
+
     /// Opening a door switches a spindle that turns, and nothing where none does.
     #[test]
     fn a_door_is_what_switched_last_only_where_the_spindle_turns() {

@@ -247,4 +247,43 @@ mod tests {
             .collect();
         assert_eq!(seen, [(8.0, 10.0), (13.0, 10.0)]);
     }
+
+    /// Each axis is compared with its own limits, which are those of a rapid in a rapid, and the highest share in the period is what
+    /// counts: of any axis, at any point, in any segment.
+    #[test]
+    fn the_highest_share_of_any_limit_in_the_period_counts() {
+        let limits: [AxisLimits; MAX_AXES] = std::array::from_fn(|axis| AxisLimits {
+            feed_mm_per_s: 10.0 + axis as f64,
+            rapid_mm_per_s: 30.0 + axis as f64,
+            acceleration_mm_per_s2: 200.0 + axis as f64,
+            ..AxisLimits::unlimited()
+        });
+        let segment = |axis: usize, speed: f64, acceleration: f64, flags: SegmentFlags| {
+            let mut segment = Segment::rest(&AxisVector::ZERO, 0.5);
+            segment.coefficients[axis][1] = speed;
+            segment.coefficients[axis][2] = acceleration / 2.0;
+            segment.flags = flags;
+            segment
+        };
+        for axis in 0..3 {
+            for (flags, limit) in [
+                (SegmentFlags::default(), limits[axis].feed_mm_per_s),
+                (SegmentFlags::RAPID, limits[axis].rapid_mm_per_s),
+            ] {
+                // It gets slower, from 0.7 of its speed on.
+                let acceleration = -0.4 * limits[axis].acceleration_mm_per_s2;
+                let highest = segment(axis, 0.7 * limit, acceleration, flags);
+                let slow = segment((axis + 1) % 3, 1.0, 1.0, SegmentFlags::default());
+                for order in [[&highest, &slow], [&slow, &highest]] {
+                    let mut points = PeriodPoints::new(&limits, 3);
+                    for segment in order {
+                        points.add(segment, 0.0, 0.001);
+                    }
+                    let found = [points.speed_ratio, points.acceleration_ratio];
+                    let off = (found[0] - 0.7).abs().max((found[1] - 0.4).abs());
+                    assert!(off < 1e-9, "axis {axis}: {found:?}");
+                }
+            }
+        }
+    }
 }

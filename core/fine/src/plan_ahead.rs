@@ -558,6 +558,50 @@ mod tests {
         assert_eq!(seen(&segment), (3.0, 1.5));
     }
 
+    /// Speed and its rise are those of the axes together, on a course that bends too: the rise is what the speed gains.
+    #[test]
+    fn the_pace_of_axes_rises_as_their_speed_does() {
+        let mut segment = Segment::rest(&AxisVector::ZERO, 1.0);
+        segment.coefficients[0] = [0.0, 3.0, -2.0, 0.5, 0.0, 0.0];
+        segment.coefficients[1] = [0.0, -4.0, 1.0, 2.0, 0.3, 0.0];
+        let ahead = PlanAhead::new(&segment, [&[], &[]], TWO_LINEAR);
+        let pace = |at_s: f64| ahead.begin(at_s).pace().unwrap();
+        for at_s in [0.1, 0.4, 0.9] {
+            let gains = (pace(at_s + 1e-5).speed - pace(at_s - 1e-5).speed) / 2e-5;
+            let rise = pace(at_s).rise;
+            assert!(gains.abs() > 1.0, "{gains}");
+            assert!((rise - gains).abs() < 1e-6 * gains.abs(), "{rise}, {gains}");
+        }
+    }
+
+    /// From a rest the plan goes on with what moves next: events and segments without duration lie between, and nothing else is skipped.
+    #[test]
+    fn from_a_rest_the_plan_goes_on_with_the_first_segment_that_has_a_duration() {
+        let mut rests = Segment::rest(&AxisVector::ZERO, 1.0);
+        rests.flags = SegmentFlags::ENDS_AT_REST;
+        let event = Queued::Event(Event::new(EventKind::Mist, 0, 0, 0, 1.0));
+        let lasts = |duration_s: f64| {
+            let mut segment = rests;
+            (segment.duration_s, segment.path[1]) = (duration_s, duration_s);
+            Queued::Segment {
+                start_s: 0.0,
+                segment,
+            }
+        };
+        let queued = [event, lasts(0.0), event, lasts(2.0), lasts(3.0)];
+        for (in_queue, expected) in [(0, None), (3, None), (4, Some(2.0)), (5, Some(2.0))] {
+            for in_first in 0..=in_queue {
+                let (first, second) = queued[..in_queue].split_at(in_first);
+                let plan = PlanAhead::new(&rests, [first, second], TWO_LINEAR);
+                assert!(!plan.begin(0.5).begin_after_rest(), "it moves still");
+                let mut place = plan.begin(1.0);
+                assert_eq!(place.begin_after_rest(), expected.is_some());
+                let found = place.pace().map(|pace| pace.speed);
+                assert_eq!(found, Some(expected.unwrap_or(0.0)), "of {in_queue}");
+            }
+        }
+    }
+
     #[test]
     fn the_pieces_begin_where_the_machine_is_and_end_with_the_rest() {
         let mut cursor = cursor(&[1.0, 2.0, 4.0, 8.0]);

@@ -399,6 +399,19 @@ mod tests {
             prop_assert!(lane.velocity == 0.0);
         }
 
+        /// What a period can bring to rest within the jerk limit is at rest behind it, of velocity and of acceleration: no rounding is left.
+        #[test]
+        fn a_lane_that_can_come_to_rest_in_a_period_is_exactly_at_rest_behind_it(
+            left in -0.999..0.999f64, change in -0.999..0.999f64, jerk in 100.0..100_000.0f64, period_s in 1e-4..2e-3f64,
+        ) {
+            let step = jerk * period_s;
+            let velocity = left * step * period_s;
+            let acceleration = change * step - velocity / period_s;
+            let mut lane = Lane { velocity, acceleration, most: 3.0 * step, jerk };
+            lane.slow(period_s);
+            prop_assert_eq!((lane.velocity, lane.acceleration), (0.0, 0.0));
+        }
+
         /// A plan brakes to rest with all that the axis has, as towards the end of its travel, and is given up on the way.
         #[test]
         fn goes_no_farther_than_a_plan_that_brakes_already(

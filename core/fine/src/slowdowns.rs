@@ -463,6 +463,31 @@ mod tests {
         }
     }
 
+    /// Lines of a mm each, at 1 mm/s: the end that is chosen stays until the machine is beyond it, and is passed from then on.
+    #[test]
+    fn the_end_of_a_line_is_passed_where_it_lies_behind_the_machine() {
+        let (mut input, output) = RingBuffer::new(4);
+        for line in 1..=3 {
+            let mut segment = Segment::rest(&AxisVector::ZERO, 1.0);
+            segment.line = line;
+            segment.flags = SegmentFlags::default();
+            segment.path = [f64::from(line - 1), 1.0, 0.0, 0.0, 0.0, 0.0];
+            let start_s = 0.0;
+            input.push(Queued::Segment { start_s, segment }).unwrap();
+        }
+        let mut cursor = Cursor::new(output, &AxisVector::ZERO);
+        let mut line_end = LineEnd::default();
+        cursor.advance(0.5, |_| false);
+        assert!(!line_end.is_passed(&cursor), "none is chosen");
+        line_end.look(&mut cursor, |_| 0.0);
+        for (passes_s, is_passed) in [(0.0, false), (0.25, false), (0.25, false), (0.25, true)] {
+            cursor.advance(passes_s, |_| false);
+            assert_eq!(line_end.is_passed(&cursor), is_passed);
+        }
+        line_end.forget();
+        assert!(!line_end.is_passed(&cursor), "it is forgotten");
+    }
+
     /// A machine at 2 mm/s that turns on next to no path behind the second line.
     #[test]
     fn what_is_left_behind_the_end_of_a_line_says_nothing_of_the_stop_there() {

@@ -101,6 +101,12 @@ mod tests {
         }
     }
 
+    /// The share of its limit that an axis reaches where σ has gone by `change` from `sigma`: at the start and at the end of the time.
+    fn reached(sigma: f64, [velocity_per_s, acceleration]: [f64; 2], change: f64) -> [f64; 2] {
+        [sigma, sigma + change]
+            .map(|sigma| (sigma * sigma * acceleration + change * velocity_per_s).abs())
+    }
+
     /// At the limit already, and about to rise beyond it: there is no room, though nothing changes yet.
     #[test]
     fn a_rise_from_the_limit_crosses_it_at_once() {
@@ -111,6 +117,28 @@ mod tests {
     }
 
     proptest! {
+        /// Up and down σ goes just so far that the axis comes to its limit, or to what the plan itself takes where that is more, at one end
+        /// of the time, and at no change before that.
+        #[test]
+        fn the_rate_goes_as_far_as_brings_an_axis_to_its_limit(
+            sigma in 0.0..1.0f64, velocity_per_s in -1e4..1e4f64, acceleration in -1500.0..1500.0f64, rises in proptest::bool::ANY,
+        ) {
+            const LIMIT: f64 = 1000.0;
+            let direction = if rises { 1.0 } else { -1.0 };
+            let planned = [velocity_per_s, acceleration];
+            let most = (ORDER2_LIMIT_SHARE * LIMIT).max(sigma * sigma * acceleration.abs());
+            let far = reach(sigma, planned.into(), LIMIT, direction);
+            for step in 0..=100 {
+                let change = direction * far.min(10.0) * f64::from(step) / 100.0;
+                let [start, end] = reached(sigma, planned, change);
+                prop_assert!(start.max(end) <= most * (1.0 + 1e-9), "{start} and {end} of {most} at {change} of {far}");
+            }
+            if far.is_finite() {
+                let [start, end] = reached(sigma, planned, direction * far);
+                prop_assert!(start.max(end) >= most * (1.0 - 1e-6), "{start} and {end} of {most} at {far}");
+            }
+        }
+
         #[test]
         fn the_crossing_is_the_first(gap in 0.0..10.0f64, slope in -5.0..5.0f64, curve in -5.0..5.0f64) {
             let at = |t: f64| slope * t + curve * t * t;

@@ -411,3 +411,161 @@ fn a_period_that_begins_at_the_feed_keeps_it_in_its_mean() {
     let mean_mm_per_s = way_mm / PERIOD_S;
     assert!((9.8..10.01).contains(&mean_mm_per_s), "{mean_mm_per_s}");
 }
+
+/// At the ratio that it is made for a plan says by itself how fast it is: neither the feed nor the way of the axes slows it.
+#[test]
+fn at_the_ratio_of_the_plan_its_own_speed_is_driven() {
+    let planned = Ratios {
+        feed: 2.0,
+        mean_feed: 2.0,
+        rapid: 1.0,
+    };
+    // A little beyond twice the feed, as a fit leaves it; and the axes by as little beyond the path.
+    let mut line = segment([1.0, 20.1, 0.0, 0.0, 0.0, 0.0], 10.0, 1.0);
+    line.coefficients[0][1] = 20.2;
+    for order in [2, 3] {
+        let mut follower = follower(order, &[line]);
+        follower.cursor.advance(0.1, |_| false);
+        follower.governor.jump(0.98);
+        for _ in 0..100 {
+            let chosen = follower.govern(Request {
+                ratios: planned,
+                ..request(Ask::Run)
+            });
+            let delta_s = chosen.delta_s;
+            follower.cursor.advance(delta_s, |_| false);
+        }
+        assert_eq!(follower.governor.sigma(), 1.0, "{order}");
+    }
+}
+
+/// The plan goes on at its own rate without a look ahead only where nothing asks for another one.
+#[test]
+fn a_plan_runs_as_it_is_where_nothing_asks_for_less() {
+    let line = segment([0.0, 20.0, 0.0, 0.0, 0.0, 0.0], 20.0, 1.0);
+    let mut follower = follower(3, &[line]);
+    follower.cursor.advance(0.1, |_| false);
+    let full = request(Ask::Run);
+    let slower_rapids = Ratios {
+        rapid: 0.9,
+        ..AT_THE_FEED
+    };
+    for (request, below, ratios, sigma, runs) in [
+        (full, false, AT_THE_FEED, 1.0, true),
+        (full, false, AT_THE_FEED, 0.9, false),
+        (full, true, AT_THE_FEED, 1.0, false),
+        (full, false, slower_rapids, 1.0, false),
+        (request(Ask::Hold), false, AT_THE_FEED, 1.0, false),
+        (request(Ask::Starve), false, AT_THE_FEED, 1.0, false),
+        (
+            Request {
+                single_block: true,
+                ..full
+            },
+            false,
+            AT_THE_FEED,
+            1.0,
+            false,
+        ),
+        (
+            Request {
+                max_rate: 0.9,
+                ..full
+            },
+            false,
+            AT_THE_FEED,
+            1.0,
+            false,
+        ),
+    ] {
+        follower.request = request;
+        follower.governor.jump(sigma);
+        follower.points.fill(&follower.cursor.ahead(), PERIOD_S);
+        let found = follower.runs_as_planned(request.ask, below, &ratios);
+        assert_eq!(found, runs, "{request:?} {below} {ratios:?} at {sigma}");
+    }
+}
+
+/// From rest to rest in so many periods, in the mean so many times as fast as the feed: at the rate to begin with neither the end of a period nor
+/// its mean is beyond the feed, whether it ends on the way or at the rest behind it.
+#[test]
+fn a_rate_to_begin_with_keeps_the_feed_on_a_way_that_is_over_within_a_few_periods() {
+    let feed = 10.0;
+    for (lasts, mean) in [0.5, 0.9, 1.0, 1.7, 2.5, 3.3, 4.9]
+        .into_iter()
+        .flat_map(|lasts| [1.1, 1.6, 2.0, 5.0, 30.0].map(|mean| (lasts, mean)))
+    {
+        let duration_s = lasts * PERIOD_S;
+        let first = 6.0 * mean * feed / duration_s;
+        let path = [0.0, 0.0, first / 2.0, -first / duration_s / 3.0, 0.0, 0.0];
+        let bump = segment(path, feed, duration_s);
+        let mut rest = segment([0.0; 6], feed, 1.0);
+        rest.path[0] = bump.path_mm(duration_s);
+        let mut follower = follower(3, &[bump, rest]);
+        follower.governor.jump(1.0);
+        follower.begin_below(&AT_THE_FEED);
+        let sigma = follower.governor.sigma();
+        assert!(sigma > 0.0);
+        let at = |periods: f64| (periods * sigma * PERIOD_S).min(duration_s);
+        for period in (1..=BEGINNING_PERIODS).map(f64::from) {
+            let way_mm = bump.path_mm(at(period)) - bump.path_mm(at(period - 1.0));
+            let end_mm_per_s = sigma * bump.path_speed_mm_per_s(at(period));
+            let fastest = end_mm_per_s.max(way_mm / PERIOD_S);
+            assert!(
+                fastest <= feed * (1.0 + 1e-6),
+                "{fastest} in period {period} of a way of {lasts}, {mean} times as fast: {sigma}"
+            );
+        }
+    }
+}
+
+/// The feed falls with every segment of 6 ms: those that a stop from here may have to be over before are looked for, and those far behind
+/// are left for later.
+#[test]
+fn lower_feeds_are_looked_for_as_far_as_a_stop_and_a_few_periods_go() {
+    let segments: Vec<_> = (0..15)
+        .map(|number| {
+            let speed_mm_per_s = 20.0;
+            let from_mm = speed_mm_per_s * 0.006 * f64::from(number);
+            let path = [from_mm, speed_mm_per_s, 0.0, 0.0, 0.0, 0.0];
+            segment(path, 20.0 - f64::from(number), 0.006)
+        })
+        .collect();
+    for deceleration in [400.0, 1000.0, 4000.0] {
+        let mut follower = follower(2, &segments);
+        follower.cursor.advance(0.003, |_| false);
+        follower.request = Request {
+            stop_deceleration_mm_per_s2: deceleration,
+            ..request(Ask::Run)
+        };
+        follower.speed_for_places(&AT_THE_FEED, None);
+        let seen = follower.slowdowns.to_meet(0.0, f64::INFINITY).count();
+        let stop_s = 20.0 / deceleration + ACCELERATION / JERK;
+        let periods = (0.006 * seen as f64 - 0.003 - stop_s) / PERIOD_S;
+        let all = seen + 1 == segments.len();
+        assert!(
+            all || (0.0..16.0).contains(&(periods + 6.0)),
+            "{deceleration}: {seen}, {periods} periods"
+        );
+        assert_eq!(all, deceleration == 400.0, "{seen} of them");
+    }
+}
+
+/// With a jerk limit a stop at the end of a line is sought by itself: what is asked of the speed is rest, once next to nothing is left.
+#[test]
+fn at_the_end_of_a_line_next_to_nothing_is_left_before_the_speed_is_to_be_none() {
+    let mut follower = follower(3, &[segment([7.0, 20.0, 0.0, 0.0, 0.0, 0.0], 20.0, 1.0)]);
+    follower.cursor.advance(0.1, |_| false);
+    for (left_mm, asked) in [
+        (1.0, f64::INFINITY),
+        (1.01 * AT_LINE_END_MM, f64::INFINITY),
+        (0.99 * AT_LINE_END_MM, 0.0),
+        (0.0, 0.0),
+    ] {
+        let end = EndOfLine {
+            path_mm: follower.cursor.path_mm() + left_mm,
+            stop_deceleration_mm_per_s2: ACCELERATION,
+        };
+        assert_eq!(follower.speed_to_rest(&end), asked, "{left_mm} mm");
+    }
+}

@@ -190,6 +190,24 @@ mod tests {
         }
     }
 
+    /// Where a rest ahead asks for less and less, to come to it is still progress, and to stand before it is none.
+    #[test]
+    fn what_stands_is_a_fault_after_the_window_however_little_was_asked_for() {
+        for asked in [1.0, 1e-3, 0.0] {
+            let ((mut cursor, _input), mut progress) = (cursor(), Progress::new(&config(2)));
+            let most = progress.max_periods;
+            let mut watch = |cursor: &Cursor| {
+                progress.ask(asked);
+                progress.watch(cursor, Ask::Run, Reached::Inside, PERIOD_S, || 1.0)
+            };
+            for _ in 0..2 * most {
+                cursor.advance(2.0 * asked.max(1e-6) * PERIOD_S / 10.0, |_| false);
+                assert_eq!(watch(&cursor), None, "it gets on");
+            }
+            assert!((0..=most).any(|_| watch(&cursor).is_some()));
+        }
+    }
+
     fn copy_of(progress: &Progress) -> Progress {
         Progress { ..*progress }
     }

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 
 use tandem_fine::{FineConfig, FineLoop, GuardMode, Joints};
 use tandem_rig::Echo;
-use tandem_rings::{HostEnd, MachineState, Queued, RoughEnd, Sizes, bridge};
+use tandem_rings::{HostEnd, MachineState, Queued, Rest, RoughEnd, Sizes, bridge};
 use tandem_sdk::{
     AxisLimits, AxisVector, Edge, Event, EventKind, Kinematics, Latch, Limits, PluginError,
     Segment, SegmentFlags, StopOn,
@@ -87,6 +87,7 @@ impl Bench {
             guard,
             max_feed_ratio,
             kept_outputs: 1 << KEPT_OUTPUT,
+            pause_at_stops: true,
             ..FineConfig::new(PERIOD_S, Limits::new(&[axis; 6][..entries]).unwrap())
         };
         let (rough, end, host) = bridge(Sizes {
@@ -213,12 +214,13 @@ impl Bench {
         );
     }
 
-    /// Takes the report of a rest, and queues in the next epoch from there.
-    pub fn go_on(&mut self) {
+    /// Takes the report of a rest, which it gives, and queues in the next epoch from there.
+    pub fn go_on(&mut self) -> Rest {
         let rest = self.rough.rests.pop().expect("a rest");
         (self.epoch, self.queued_s, self.x_mm) =
             (rest.epoch + 1, rest.program_time_s, rest.position[0]);
         self.rough.depth.begin(self.epoch, self.queued_s);
+        rest
     }
 
     /// Queues a rest.

@@ -164,6 +164,8 @@ fn holds(mut bench: Bench, doing: Doing, door: bool, random: &mut Random) {
     bench.ticks(2);
     let controls = Arc::clone(&bench.host.controls);
     assert!(controls.hold.load(Relaxed));
+    let tripped = |bench: &Bench| bench.host.status.tripped.load(Relaxed);
+    assert_eq!(tripped(&bench), 1 << bench.input);
     assert_eq!(
         bench.told().spindle_rad_per_s == 0.0,
         door || [Doing::Enabling, Doing::Waiting].contains(&doing)
@@ -208,6 +210,7 @@ fn holds(mut bench: Bench, doing: Doing, door: bool, random: &mut Random) {
     controls.hold.store(false, Relaxed);
     bench.ticks(2500);
     assert_eq!(bench.fault(), None);
+    assert_eq!(tripped(&bench), 0, "it is released");
     let script = bench.script();
     let moved = script.told[from..]
         .iter()

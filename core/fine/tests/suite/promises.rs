@@ -4,9 +4,9 @@ use crate::common;
 
 use std::sync::atomic::Ordering::Relaxed;
 
-use common::Bench;
+use common::{Bench, PERIOD_S};
 use tandem_fine::{FaultKind, GuardMode};
-use tandem_rings::{MachineState, Sample};
+use tandem_rings::{MachineState, RestCause, Sample, StopCause};
 use tandem_sdk::EventKind;
 
 fn tick(bench: &mut Bench, periods: u32) -> Vec<Sample> {
@@ -214,4 +214,72 @@ fn a_plan_beyond_its_limits_counts_as_governed_unless_something_asks_for_less() 
     );
     tick(&mut bench, 2000);
     assert!(bench.fine.counters().governed_samples > 0);
+}
+
+/// What stands where it was told to end, and not before, is at rest: an abort and an edge that comes stop the machine within its limits first.
+#[test]
+fn a_stop_for_good_ends_in_a_rest_that_is_told_where_the_machine_has_come_to() {
+    for (cause, later) in [
+        (RestCause::Abort, 0),
+        (RestCause::Abort, 7),
+        (RestCause::Abort, 150),
+        (RestCause::Edge, 0),
+        (RestCause::Edge, 150),
+    ] {
+        let mut bench = Bench::new(GuardMode::Stop);
+        if cause == RestCause::Edge {
+            bench.probe();
+        }
+        bench.accelerate();
+        bench.cruise(3.0);
+        bench.brake();
+        // 60 mm/s² are 12 mm/s after 60 periods.
+        tick(&mut bench, 60 + later);
+        if cause == RestCause::Edge {
+            bench.catch_edge(bench.fine.sent()[0]);
+        } else {
+            bench.host.controls.abort.store(true, Relaxed);
+        }
+        let samples = tick(&mut bench, 60);
+        let speeds: Vec<_> = samples
+            .windows(2)
+            .map(|pair| (pair[1].command[0] - pair[0].command[0]) / PERIOD_S)
+            .collect();
+        for pair in speeds.windows(2) {
+            let change = (pair[1] - pair[0]).abs() / PERIOD_S;
+            assert!(change < 1000.0 * (1.0 + 1e-6), "{change} mm/s², {cause:?}");
+        }
+        assert!(
+            speeds[0] > 10.0 && speeds.last() == Some(&0.0),
+            "{speeds:?}"
+        );
+        assert_eq!(bench.fine.fault(), None);
+        let rest = bench.go_on();
+        assert_eq!(rest.cause, cause);
+        assert_eq!(rest.position, samples.last().unwrap().command);
+    }
+}
+
+#[test]
+fn a_stop_of_the_program_is_the_cause_of_the_hold_that_it_is() {
+    let mut bench = Bench::new(GuardMode::Stop);
+    bench.peak(20.0);
+    bench.event(EventKind::ProgramStop, 0, 0.0);
+    bench.peak(20.0);
+    let samples = tick(&mut bench, 200);
+    assert_eq!(bench.state(), MachineState::Holding);
+    let held: Vec<_> = samples
+        .iter()
+        .filter(|sample| sample.state == MachineState::Holding)
+        .collect();
+    let by_program = |sample: &&Sample| sample.cause == StopCause::ProgramStop;
+    assert!(held.len() > 50 && held.iter().all(by_program));
+    let controls = &bench.host.controls;
+    controls.program_hold.store(false, Relaxed);
+    let samples = tick(&mut bench, 20);
+    assert_eq!(bench.state(), MachineState::Running);
+    assert_eq!(
+        samples.last().map(|sample| sample.cause),
+        Some(StopCause::None)
+    );
 }
