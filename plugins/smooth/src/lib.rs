@@ -19,6 +19,7 @@
     reason = "lanes of several arrays go side by side"
 )]
 
+mod chain;
 mod core;
 mod emit;
 mod feeds;

@@ -8,8 +8,9 @@
 use tandem_motion::in_wide_instructions;
 use tandem_motion::tube::Lanes;
 
+use crate::chain::Chain;
 use crate::feeds::Feeder;
-use crate::frame::{Frame, dot, larger, to_chord};
+use crate::frame::{Frame, dot, larger, minus, to_chord};
 use crate::order::{Order, REACH};
 use crate::path_distance::{
     ALLOWED, DEVIATION, FAR, HALVINGS, NEAR_ENOUGH, PathDistance, SEARCHED, closer, distance_bound,
@@ -303,45 +304,65 @@ impl<const L: usize> Checker<L> {
         window: &Window<L>,
         period_s: f64,
     ) -> (f64, f64) {
-        let from = start.s - AROUND;
-        let to = window.end();
-        let mut timer = Timer {
-            marks: &window.marks,
-            at: 0,
-        };
         let mut worst = 0.0f64;
         let mut max_bulge = 0.0f64;
-        let mut piece = 0;
         let mut passed = [0; 2];
-        let mut i = run.chord_at(from, 0).max(1);
-        while i < run.chords.len() && run.chords[i].s < to {
+        let mut last_link = 0;
+        let mut is_in_order = true;
+        for Passing { chord: i, t, piece } in passings(run, start, window) {
             let chord = &run.chords[i];
-            let t = if chord.s <= start.s {
-                0.0
-            } else {
-                timer.time(chord.s)
-            };
-            let tolerance = chord.tolerance.max(run.chords[i - 1].tolerance);
-            while piece + 1 < window.pieces.len() && window.pieces[piece].end_s() < t {
-                piece += 1;
+            let tolerance = vertex_tolerance(run, i);
+            let among = self.order.around(chord.s, &mut passed);
+            let near = (t / period_s) as usize + start.before.len();
+            let (off, link) = self.nearest_sample(near, among, &chord.start, tolerance);
+            let mut bulge = self.bends[piece] * period_s * period_s / 8.0;
+            if off + bulge > ALLOWED * tolerance {
+                bulge = self.bulge_around(window, piece, t, period_s);
+                max_bulge = larger(max_bulge, bulge / tolerance);
             }
-            if chord.s > from {
-                let among = self.order.around(chord.s, &mut passed);
-                let near = (t / period_s) as usize + start.before.len();
-                let off = self.nearest_sample(near, among, &chord.start, tolerance);
-                let mut bulge = self.bends[piece] * period_s * period_s / 8.0;
-                if off + bulge > ALLOWED * tolerance {
-                    bulge = self.bulge_around(window, piece, t, period_s);
-                    max_bulge = larger(max_bulge, bulge / tolerance);
-                }
-                worst = larger(worst, (off + bulge) / (ALLOWED * tolerance));
-                if worst > FAR || worst.is_nan() {
-                    break;
-                }
+            worst = larger(worst, (off + bulge) / (ALLOWED * tolerance));
+            if worst > FAR || worst.is_nan() {
+                break;
             }
-            i += 1;
+            is_in_order &= link > last_link
+                || link == last_link && self.goes_along(link, &run.chords[i - 1].direction);
+            last_link = link;
+        }
+        if worst <= 1.0 && !is_in_order && !self.meets_in_order(run, start, window, period_s) {
+            worst = FAR;
         }
         (worst, max_bulge)
+    }
+
+    /// Whether the motion goes in `direction` behind sample `link`, and not against it.
+    #[inline(always)]
+    fn goes_along(&self, link: usize, direction: &Lanes<L>) -> bool {
+        dot(
+            &minus(&self.samples[link + 1], &self.samples[link]),
+            direction,
+        ) >= 0.0
+    }
+
+    /// Whether the motion meets the vertices one behind the other: each at the first place that is near enough, behind that of the vertex
+    /// before. Each by itself may be near a place that is passed at another time: where the path turns back and comes by again, a
+    /// motion that goes straight on passes both ends of the fold, in the wrong order.
+    fn meets_in_order(
+        &self,
+        run: &Run<'_, L>,
+        start: &Start<'_, L>,
+        window: &Window<L>,
+        period_s: f64,
+    ) -> bool {
+        let mut passed = [0; 2];
+        let mut chain = Chain::new(&self.samples);
+        passings(run, start, window).all(|Passing { chord, t, piece }| {
+            let bulge = self.bends[piece] * period_s * period_s / 8.0;
+            let bulge = smaller(bulge, self.bulge_around(window, piece, t, period_s));
+            let reach = ALLOWED * vertex_tolerance(run, chord) - bulge;
+            let chord = &run.chords[chord];
+            let among = self.order.around(chord.s, &mut passed);
+            chain.goes_on(&chord.start, among, reach)
+        })
     }
 
     /// How far the motion stands off the chain of samples around `t`: what turns it counts alone, as far as its direction is
@@ -375,7 +396,8 @@ impl<const L: usize> Checker<L> {
         local.min(across + turned * bend) * period_s * period_s / 8.0
     }
 
-    /// The distance of `vertex` from the chain of those samples that may pass it, `among` which sample `near` is sought first.
+    /// The distance of `vertex` from the chain of those samples that may pass it, among which sample `near` is sought first, and behind
+    /// which of them it is that near.
     #[inline(always)]
     fn nearest_sample(
         &self,
@@ -383,37 +405,30 @@ impl<const L: usize> Checker<L> {
         (first, last): (usize, usize),
         vertex: &Lanes<L>,
         tolerance: f64,
-    ) -> f64 {
+    ) -> (f64, usize) {
         let last = last.min(self.samples.len() - 2);
         let first = first.min(last);
         let near = near.clamp(first, last);
         let enough = (NEAR_ENOUGH * tolerance).powi(2);
         let allowed = DEVIATION * tolerance;
-        let mut best = f64::INFINITY;
+        let mut best = (f64::INFINITY, near);
         for step in 0..SEARCHED {
             let below = near.checked_sub(step).filter(|n| *n >= first);
             let above = near + step;
-            if let Some(below) = below {
-                best = smaller(
-                    best,
-                    to_chord(vertex, &self.samples[below], &self.samples[below + 1]),
-                );
-            }
-            if above <= last && step > 0 {
-                best = smaller(
-                    best,
-                    to_chord(vertex, &self.samples[above], &self.samples[above + 1]),
-                );
+            let sides = [below, Some(above).filter(|n| *n <= last && step > 0)];
+            for link in sides.into_iter().flatten() {
+                let off = to_chord(vertex, &self.samples[link], &self.samples[link + 1]);
+                best = if off < best.0 { (off, link) } else { best };
             }
             // A few around, and then only as long as it is too far.
-            if best < enough || step >= 3 && best <= allowed * allowed {
+            if best.0 < enough || step >= 3 && best.0 <= allowed * allowed {
                 break;
             }
             if below.is_none() && above > last {
                 break;
             }
         }
-        best.sqrt()
+        (best.0.sqrt(), best.1)
     }
 }
 
@@ -433,6 +448,53 @@ const TURNS: f64 = 0.1;
 
 /// Way before the start, mm, in which vertices are looked at again: the samples behind the start are new.
 const AROUND: f64 = 0.05;
+
+/// A vertex that the motion passes: the chord that it is the start of, when it is to be passed, and the piece of that time.
+struct Passing {
+    chord: usize,
+    t: f64,
+    piece: usize,
+}
+
+/// The vertices of a window, in their order.
+#[inline(always)]
+fn passings<const L: usize>(
+    run: &Run<'_, L>,
+    start: &Start<'_, L>,
+    window: &Window<L>,
+) -> impl Iterator<Item = Passing> {
+    let from = start.s - AROUND;
+    let to = window.end();
+    let mut timer = Timer {
+        marks: &window.marks,
+        at: 0,
+    };
+    let mut piece = 0;
+    let first = run.chord_at(from, 0).max(1);
+    let chords = run.chords[first.min(run.chords.len())..].iter();
+    let among = (first..)
+        .zip(chords)
+        .take_while(move |(_, chord)| chord.s < to);
+    among
+        .filter(move |(_, chord)| chord.s > from)
+        .map(move |(n, chord)| {
+            let t = if chord.s <= start.s {
+                0.0
+            } else {
+                timer.time(chord.s)
+            };
+            while piece + 1 < window.pieces.len() && window.pieces[piece].end_s() < t {
+                piece += 1;
+            }
+            Passing { chord: n, t, piece }
+        })
+}
+
+/// How far the vertex at the start of chord `i` may be passed.
+#[inline(always)]
+fn vertex_tolerance<const L: usize>(run: &Run<'_, L>, i: usize) -> f64 {
+    run.chords[i].tolerance.max(run.chords[i - 1].tolerance)
+}
 
 #[inline(always)]
 fn smaller(a: f64, b: f64) -> f64 {

@@ -239,6 +239,31 @@ fn a_vertex_that_is_cut_off_counts_as_far_as_it_stands_off() {
     }
 }
 
+/// On a path that turns back by `fold`, and back again, a motion straight along it meets both vertices. Where they are more than two
+/// tolerances apart it is behind the place of the second when it comes near the first.
+#[test]
+fn a_motion_straight_through_a_fold_does_not_follow_it_where_that_is_longer_than_the_tolerance() {
+    for (fold, passes) in [(0.1, true), (0.199, true), (0.201, false), (0.25, false)] {
+        for back in 1..=4 {
+            // The way back in one chord, or in several.
+            let step = fold / f64::from(back);
+            let way_back = (1..=back).map(|n| [5.0 - f64::from(n) * step, 0.0]);
+            let mut points = vec![[0.0, 0.0], [5.0, 0.0]];
+            points.extend(way_back);
+            points.push([10.0, 0.0]);
+            let chords = path(&points, 50.0);
+            let end = chords[chords.len() - 1].end();
+            // Many samples in the fold, or next to none.
+            for duration_s in [1.0, 0.4] {
+                let mut window = rest_to_rest([0.0; 2], [10.0, 0.0], duration_s, end);
+                let checked = check(&open(&chords), &mut window, None);
+                let follows = checked.deviation <= 1.0;
+                assert_eq!(follows, passes, "{fold}: {checked:?}");
+            }
+        }
+    }
+}
+
 #[test]
 fn the_nearest_sample_is_looked_for_around_the_place_and_farther_while_it_is_too_far() {
     // Chords along X at these distances from the vertex; what leads from one to the next is far away.
@@ -252,7 +277,7 @@ fn the_nearest_sample_is_looked_for_around_the_place_and_farther_while_it_is_too
             ..Checker::default()
         };
         let among = (2 * among.0, 2 * among.1);
-        checker.nearest_sample(2 * near, among, &[0.0; 2], 1.0)
+        checker.nearest_sample(2 * near, among, &[0.0; 2], 1.0).0
     };
     let row = |middle: f64, next: f64, others: f64| {
         let mut row = [others; 9];
@@ -286,11 +311,12 @@ fn no_nearer_sample_is_overlooked_where_it_matters() {
             samples,
             ..Checker::default()
         };
-        let found = checker.nearest_sample(near, (first, last), &vertex, 1.0);
+        let (found, link) = checker.nearest_sample(near, (first, last), &vertex, 1.0);
         let off = |n: usize| to_chord(&vertex, &checker.samples[n], &checker.samples[n + 1]);
         let least = |from: usize, to: usize| (from..=to).map(off).fold(f64::INFINITY, f64::min);
         let best = least(first, last.min(18)).sqrt();
         assert!(found >= best);
+        assert_eq!(found, off(link).sqrt());
         assert!(
             found <= DEVIATION || found == best,
             "{found}, {best}: {near} in {first} to {last}"

@@ -7,11 +7,14 @@ use std::time::Duration;
 use tandem_campaign::case::Case;
 use tandem_campaign::worker::Worker;
 
-/// The folders of cases, in the order of their names.
+/// The folders of cases, in the order of their names. Where nothing is open its folder is missing: git keeps none without files.
 fn cases(of: &str) -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("../fixtures/campaign")
         .join(of);
+    if !folder.exists() {
+        return vec![];
+    }
     let entries =
         std::fs::read_dir(&folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
     let mut folders: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
