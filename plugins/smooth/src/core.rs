@@ -10,6 +10,7 @@ use crate::frame::Frame;
 use crate::plan::{Effort, Planning, Tuning};
 use crate::profile;
 use crate::route::{Item, Route};
+use crate::span::Span;
 use crate::window::{Piece, Start, State, Window};
 
 /// Part of a window in which it may be left for the next. Left at 0.40 of it at the latest, the programs of docs/smooth-planner.md
@@ -52,6 +53,7 @@ pub struct PathAhead<const L: usize> {
     pub(crate) position: Lanes<L>,
     /// Least time that the blocks held take, s.
     pub(crate) held_s: f64,
+    span: Span,
 }
 
 /// The path coordinate of what was emitted.
@@ -113,6 +115,7 @@ impl<const L: usize> PathAhead<L> {
             at: 0.0,
             position: frame.lanes(&context.position),
             held_s: 0.0,
+            span: Span::new(tuning.window_s),
         }
     }
 
@@ -150,9 +153,10 @@ impl<const L: usize> PathAhead<L> {
             resting: true,
             before: &[],
             end: run.end(),
-            window_s: self.planning.tuning.window_s,
+            window_s: self.span.now_s(),
             old: None,
         };
+        let mut refused = 0;
         let single = run.chords.len() == here + 1;
         if !(single && run.closed) {
             let mut end = run.end();
@@ -160,8 +164,10 @@ impl<const L: usize> PathAhead<L> {
                 start.end = end;
                 if self.planning.plan(&run, frame, &start, &mut self.next) {
                     std::mem::swap(&mut self.window, &mut self.next);
+                    self.span.passed(refused, self.window.duration_s());
                     return;
                 }
+                refused += 1;
                 // The next try ends where the path first turns, or has half the chords.
                 let last = run.chord_at(end.min(self.planning.end()) - 1e-9, here);
                 let cut = (here + 1..=last)
@@ -181,6 +187,7 @@ impl<const L: usize> PathAhead<L> {
             (at, chord.end()),
             &mut self.window,
         );
+        self.span.passed(refused, self.window.duration_s());
     }
 
     /// Forgets everything: at rest at `position`.
@@ -188,6 +195,7 @@ impl<const L: usize> PathAhead<L> {
         self.route.clear();
         self.at = 0.0;
         self.held_s = 0.0;
+        self.span = Span::new(self.planning.tuning.window_s);
         self.position = self.frame.lanes(position);
         self.driven = DrivenPath::default();
     }
@@ -277,14 +285,13 @@ impl<const L: usize> Windows for PathAhead<L> {
         let state: State<L> = window.state(now_s);
         let s = window.along(now_s);
         let run = self.route.run(s, finished);
-        let window_s = self.planning.tuning.window_s;
         let start = Start {
             state,
             s,
             resting: false,
             before: &self.before,
             end: run.end(),
-            window_s,
+            window_s: self.span.now_s(),
             old: Some((&self.window, now_s)),
         };
         let known = run.end() <= self.window.end() + 1e-9;
@@ -295,6 +302,7 @@ impl<const L: usize> Windows for PathAhead<L> {
                 .plan(&run, &self.frame, &start, &mut self.next)
         {
             std::mem::swap(&mut self.window, &mut self.next);
+            self.span.passed(0, self.window.duration_s());
             self.driven.begin_window();
             Planned::NextWindow {
                 commit_s: self.commit_s(),

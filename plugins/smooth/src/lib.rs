@@ -34,6 +34,7 @@ mod planner;
 mod profile;
 mod report;
 mod route;
+mod span;
 mod timing;
 mod travel;
 mod turns;

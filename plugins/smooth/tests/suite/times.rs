@@ -3,6 +3,7 @@
 use crate::common;
 
 use common::{Peaks, context, judge, lines, read, run, samples};
+use tandem_sdk::{AxisLimits, PlannerContext};
 use tandem_smooth::{Effort, Options};
 
 fn path(name: &str) -> String {
@@ -98,4 +99,31 @@ fn rounds_before_the_last_take_a_coarser_grid_except_where_it_is_short() {
         let share = of(4) / of(1);
         assert!(expected.contains(&share), "{grid_ms} ms: {share}");
     }
+}
+
+/// On an arc whose tolerance is far below what the grid can follow no window passes but a short one. It is looked for by halving the
+/// first; afterwards as long ones as that one are planned.
+#[test]
+fn windows_far_longer_than_those_that_pass_are_not_planned_again_and_again() {
+    let axis = AxisLimits {
+        feed_mm_per_s: 1900.0,
+        jerk_mm_per_s3: 3e7,
+        ..tandem_rig::axis(7e5)
+    };
+    let context = PlannerContext {
+        path_tolerance_mm: 0.000_24,
+        ..tandem_rig::context(&[axis; 2], 0.0016)
+    };
+    let arc = tandem_rig::arc(&context.position, [0.0, 30.0], 1.5, 1900.0);
+    let (collected, effort) = run(
+        &tandem_rig::numbered(vec![arc]),
+        &Options::default(),
+        &context,
+    );
+    assert!(
+        !collected.segments.is_empty() && effort.stops > 20,
+        "{effort:?}"
+    );
+    // Where each window begins with the longest one there are nine times as many.
+    assert!(effort.intervals < 250_000, "{effort:?}");
 }
