@@ -267,7 +267,10 @@ mod tests {
         ] {
             let stops = |waits| {
                 let mut outputs = Outputs::new(false, 0);
-                outputs.apply(&Event::new(kind, 1, 0, 0, 0.0), waits);
+                // Where two of them come together, they are one stop.
+                for _ in 0..2 {
+                    outputs.apply(&Event::new(kind, 1, 0, 0, 0.0), waits);
+                }
                 outputs.stop_requested
             };
             assert!(
@@ -308,6 +311,21 @@ mod tests {
             }
             let switched = 1 << MIST | 1 << FLOOD | 1 << 9;
             assert_eq!(outputs.bits, if on == 1.0 { switched } else { 0 });
+        }
+    }
+
+    /// Coolant goes off with the spindle, whatever is to be kept; outputs of the user that are not to be, too.
+    #[test]
+    fn a_fault_keeps_no_more_than_outputs_of_the_user() {
+        for kept in [u64::MAX, 1 << 9, 0] {
+            let mut outputs = Outputs::new(false, 0);
+            outputs.bits = 1 << MIST | 1 << FLOOD | 1 << 9 | 1 << 12;
+            outputs.spindle_rad_per_s = 30.0;
+            outputs.switch_off(kept, SwitchedBy::Fault);
+            let left = outputs.switched();
+            assert_eq!(left.outputs, (1 << 9 | 1 << 12) & kept);
+            assert_eq!(left.spindle_rad_per_s, 0.0);
+            assert_eq!(left.by, SwitchedBy::Fault);
         }
     }
 

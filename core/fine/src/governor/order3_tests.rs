@@ -362,6 +362,73 @@ fn an_approach_comes_in_with_its_share_of_the_jerk() {
     }
 }
 
+/// So does a rate that no feed bounds, in small steps while it begins and in some times as large ones where it ends.
+#[test]
+fn a_rate_comes_in_to_its_aim_with_its_share_in_small_steps() {
+    let segment = along_x([50.0, 0.0, 0.0], 0.2);
+    for (share, periods) in [(0.97, 12), (0.8, 13), (0.5, 14)] {
+        let (_, mut horizon) = governor_on(&segment, 0.5, 0.0);
+        horizon.approach_jerk_share = share;
+        let coming_in = share * ORDER3_LIMIT_SHARE * horizon.rate_change_per_s2;
+        let [off, rate] = coming_in_with(coming_in, periods);
+        let (governor, _) = governor_on(&segment, 0.5, rate);
+        let found = governor.freely(0.5 - off, &horizon);
+        assert!(
+            (found / coming_in - 1.0).abs() < 1e-6,
+            "{found} of {coming_in}"
+        );
+    }
+    for hurried in [false, true] {
+        for (rate, [most_down, most_up]) in [
+            (-0.1, [1.0, APPROACH_END_FACTOR]),
+            (0.0, [APPROACH_END_FACTOR, 1.0]),
+            (0.1, [APPROACH_END_FACTOR, 1.0]),
+        ] {
+            let (governor, mut horizon) = governor_on(&segment, 0.5, rate);
+            if hurried {
+                horizon.hurry();
+            }
+            let small = horizon.small_change_per_s2();
+            for share in [-9.0, -4.0, -1.0, -0.7, 0.0, 0.7, 1.0, 4.0, 9.0] {
+                let expected = small * f64::clamp(share, -most_down, most_up);
+                assert_eq!(governor.small(share * small, &horizon), expected);
+            }
+        }
+    }
+}
+
+/// An axis that brakes harder than what is left of its velocity takes is brought to rest in two periods: behind the first its velocity is what
+/// the second takes to bring its acceleration to nothing, whichever way it goes.
+#[test]
+fn next_to_its_rest_the_slowest_axis_is_brought_to_it_in_two_periods() {
+    const JERK: f64 = 1000.0;
+    let mut limits = limits(1000.0, 1e6);
+    limits[1].jerk_mm_per_s3 = JERK;
+    let path = [0.02, 0.0, 0.0];
+    for sign in [-1.0, 1.0] {
+        for (left, braking) in [(0.02, 1.0), (0.05, 1.2), (0.1, 1.4), (0.2, 1.5)] {
+            let velocity = sign * left * JERK * PERIOD_S * PERIOD_S;
+            let acceleration = -sign * braking * JERK * PERIOD_S;
+            let mut segment = along_x(path, 0.2);
+            let planned = [velocity / SIGMA, acceleration / SIGMA / SIGMA];
+            segment.coefficients[1] = [0.0, planned[0], planned[1] / 2.0, 0.0, 0.0, 0.0];
+            let ahead = Ahead::new(&segment, Some(0.0), 0, None);
+            let mut horizon = Horizon::new(&limits, 2, PERIOD_S);
+            horizon.fill(&ahead, PERIOD_S);
+            let mut governor = Governor::new(&limits, 2, PERIOD_S);
+            governor.jump(SIGMA);
+            let place = ahead.place(TWO_LINEAR);
+            let jerk =
+                planned[0] * governor.wanted_by_slowest(&to_rest_from(path), &horizon, &place);
+            assert!(jerk.is_finite(), "Y decides");
+            let then = acceleration + PERIOD_S * jerk;
+            let left = velocity + f64::midpoint(acceleration, then) * PERIOD_S;
+            let off = (left + then * PERIOD_S / 2.0) / velocity;
+            assert!(off.abs() < 1e-6, "{off} of {velocity} mm/s");
+        }
+    }
+}
+
 /// Which way an axis goes is no matter: it decides alike how a stop begins.
 #[test]
 fn the_slowest_axis_decides_alike_in_both_directions() {

@@ -226,6 +226,15 @@ fn a_period_is_asked_for_its_end_and_for_its_mean() {
         assert!((asked.at_end - 5.2 / end).abs() < 1e-6, "{}", asked.at_end);
         assert!((asked.mean - 5.2 / mean).abs() < 1e-6, "{}", asked.mean);
     }
+    let asked = follower.asked_of_period(
+        0.0,
+        &Ratios {
+            mean_feed: 0.5,
+            ..AT_THE_FEED
+        },
+        f64::INFINITY,
+    );
+    assert!((asked.mean - 2.6 / 5.0).abs() < 1e-9, "{}", asked.mean);
     let asked = follower.asked_of_period(0.001, &AT_THE_FEED, 3.0);
     assert!((asked.at_end - 3.0 / 6.0).abs() < 1e-9, "{}", asked.at_end);
 }
@@ -567,5 +576,113 @@ fn at_the_end_of_a_line_next_to_nothing_is_left_before_the_speed_is_to_be_none()
             stop_deceleration_mm_per_s2: ACCELERATION,
         };
         assert_eq!(follower.speed_to_rest(&end), asked, "{left_mm} mm");
+    }
+}
+
+/// A rapid is no feed: at half of the feed it is driven as it is planned, and slower only where rapids are.
+#[test]
+fn a_lower_ratio_of_feeds_does_not_slow_a_rapid() {
+    let mut rapid = segment([0.0, 20.0, 0.0, 0.0, 0.0, 0.0], 10.0, 1.0);
+    rapid.flags = SegmentFlags::RAPID;
+    for order in [2, 3] {
+        for ratio in [1.0, 0.6] {
+            let mut follower = follower(order, &[rapid]);
+            follower.cursor.advance(0.1, |_| false);
+            follower.governor.jump(0.95);
+            for _ in 0..150 {
+                let ratios = Ratios {
+                    rapid: ratio,
+                    ..AT_THE_FEED
+                };
+                let chosen = follower.govern(Request {
+                    ratios,
+                    ..request(Ask::Run)
+                });
+                let delta_s = chosen.delta_s;
+                follower.cursor.advance(delta_s, |_| false);
+            }
+            let sigma = follower.governor.sigma();
+            assert!((sigma - ratio).abs() < 1e-6, "{order} {ratio}: {sigma}");
+        }
+    }
+}
+
+/// A hundred metres on, the way of a period of next to nothing is known to a few digits: what rounding makes of a plan at the feed is not
+/// too fast.
+#[test]
+fn the_rounding_of_a_long_path_is_not_above_the_feed() {
+    let mut follower = follower(2, &[segment([1e5, 10.0, 0.0, 0.0, 0.0, 0.0], 10.0, 1.0)]);
+    for number in 1..500 {
+        follower.cursor.advance(1e-3, |_| false);
+        let delta_s = 3.7e-9 * f64::from(number);
+        let asked = follower.asked_of_period(delta_s, &AT_THE_FEED, f64::INFINITY);
+        assert_eq!(asked.mean, 1.0, "{delta_s} s");
+    }
+}
+
+/// The path gets twice as fast as the feed behind the second piece, and the axis has not enough to lower the rate in it alone: at the end of
+/// the period the rate is low enough for what comes, wherever in the pieces that is.
+#[test]
+fn a_period_that_is_laid_out_in_pieces_ends_low_enough_for_what_is_ahead() {
+    let mut lowered = 0;
+    for shares in [[0.4, 0.3], [0.2, 0.6], [0.1, 0.9], [0.55, 0.2]] {
+        let mut from_mm = 0.0;
+        let segments = [(5.0, shares[0]), (5.0, shares[1]), (20.0, 100.0)].map(|(speed, share)| {
+            let duration_s = share * PERIOD_S;
+            let mut piece = segment([from_mm, speed, 0.0, 0.0, 0.0, 0.0], 10.0, duration_s);
+            piece.coefficients[0] = [0.0, 5.0, 0.0, 0.0, 0.0, 0.0];
+            from_mm += speed * duration_s;
+            piece
+        });
+        let mut follower = follower(2, &segments);
+        follower.cursor.advance(1e-9, |_| false);
+        follower.look_at_feeds(&AT_THE_FEED);
+        let begins = follower.governor.rate_in_time(0.0);
+        follower.governor.jump(begins);
+        let ahead = follower.cursor.ahead();
+        follower.points.fill(&ahead, PERIOD_S);
+        let bounds = Bounds {
+            ratios: &AT_THE_FEED,
+            way_speed_mm_per_s: f64::INFINITY,
+            limit: 1.0,
+        };
+        let points = &mut follower.points;
+        let laid = Laid::out(&ahead, &follower.governor, points, PERIOD_S, &bounds);
+        let most = follower.governor.rate_in_time(laid.passed_s);
+        assert!(laid.sigma <= 1.03 * most, "{shares:?}: {laid:?}, {most}");
+        lowered += usize::from(laid.sigma < begins - 0.05);
+    }
+    assert!(lowered > 2, "{lowered}");
+}
+
+/// What is asked for at the least is the share of the planned feed, or the ratio of rapids where that is less, or what the queue allows.
+#[test]
+fn the_least_that_is_asked_for_is_a_share_of_what_is_planned() {
+    let line = segment([0.0, 20.0, 0.0, 0.0, 0.0, 0.0], 10.0, 1.0);
+    for order in [2, 3] {
+        for (feed, rapid, max_rate, asked) in [
+            (2.0, 1.0, 1.0, 1.0),
+            (1.5, 1.0, 1.0, 0.75),
+            (0.5, 1.0, 1.0, 0.25),
+            (1.5, 0.4, 1.0, 0.4),
+            (1.5, 1.0, 0.3, 0.3),
+        ] {
+            let mut follower = follower(order, &[line]);
+            follower.cursor.advance(0.1, |_| false);
+            let ratios = Ratios {
+                feed,
+                mean_feed: feed,
+                rapid,
+            };
+            let chosen = follower.govern(Request {
+                ratios,
+                max_rate,
+                ..request(Ask::Run)
+            });
+            assert_eq!(
+                chosen.least_asked, asked,
+                "{order}: {feed} {rapid} {max_rate}"
+            );
+        }
     }
 }

@@ -352,6 +352,8 @@ mod tests {
         let guard = Guard::new(&config);
         for (axes, after_fault, leads) in [
             ([0.0004, 0.0004], true, true),
+            // With all that it has.
+            ([0.0005, 0.0005], true, true),
             ([10.0, 0.0], true, false),
             ([0.0, 10.0], true, false),
             ([10.0, 0.0], false, true),

@@ -76,6 +76,8 @@ fn the_joint_keeps_its_limit_and_the_place_where_it_rests_is_known() {
         "the axis was to be at {} mm",
         last.command[0]
     );
+    bench.fine.reset();
+    assert!(!bench.fine.joints_went_alone(), "the axes lead them again");
 }
 
 /// It finds no joints beyond 0.5 mm, and says so.

@@ -1,13 +1,14 @@
 //! Promises of the fine loop that nothing else of this package would miss.
 
-use crate::common;
+use crate::{common, demanding};
 
 use std::sync::atomic::Ordering::Relaxed;
 
 use common::{Bench, PERIOD_S};
+use demanding::Script;
 use tandem_fine::{FaultKind, GuardMode};
 use tandem_rings::{MachineState, RestCause, Sample, StopCause};
-use tandem_sdk::EventKind;
+use tandem_sdk::{EventKind, StopOn};
 
 fn tick(bench: &mut Bench, periods: u32) -> Vec<Sample> {
     let mut samples = vec![];
@@ -282,4 +283,53 @@ fn a_stop_of_the_program_is_the_cause_of_the_hold_that_it_is() {
         samples.last().map(|sample| sample.cause),
         Some(StopCause::None)
     );
+}
+
+/// The feed of a sample is that of its period, and beside it stands the one with which the period ends.
+#[test]
+fn a_sample_says_how_fast_the_path_was_driven_in_its_period_and_at_its_end() {
+    let mut bench = Bench::new(GuardMode::Stop);
+    bench.accelerate();
+    bench.cruise(0.2);
+    bench.brake();
+    let samples = tick(&mut bench, 500);
+    for pair in samples.windows(2) {
+        let driven = (pair[1].command[0] - pair[0].command[0]) / PERIOD_S;
+        let off = (pair[1].feed_mm_per_s - driven).abs();
+        assert!(off < 1e-9, "{} for {driven} mm/s", pair[1].feed_mm_per_s);
+        let ends = [pair[0].end_feed_mm_per_s, pair[1].end_feed_mm_per_s];
+        let mean = f64::midpoint(ends[0], ends[1]);
+        // In a period the plan accelerates by 0.2 mm/s.
+        assert!((mean - driven).abs() < 0.11, "{ends:?} for {driven} mm/s");
+    }
+    let fastest = samples.iter().map(|sample| sample.end_feed_mm_per_s);
+    assert!((fastest.fold(0.0, f64::max) - 20.0).abs() < 1e-9);
+}
+
+/// Drives that count the beats of their bus notice no change of jobs.
+#[test]
+fn the_number_of_the_exchange_goes_on_from_one_job_to_the_next() {
+    let job = || demanding::Bench::new(&demanding::config(1), Script::new(1));
+    let work = |bench: &mut demanding::Bench| {
+        bench.rest(50).expect("the joint holds");
+        bench.queue(0, 0.05, 0.0, StopOn::default());
+        bench.queue_event(EventKind::ProgramEnd, 0, 0.0);
+        bench.ticks(200);
+        assert!(bench.fine.has_ended());
+    };
+    let mut first = job();
+    first.fine.stay();
+    work(&mut first);
+    let before = first.script().told.len();
+    let mut next = job();
+    next.fine.succeed(&mut first.fine, false);
+    work(&mut next);
+    let script = first.script();
+    assert!(script.told.len() > before + 200, "the drives are its");
+    let beats: Vec<_> = script.told.iter().map(|(told, _)| told.tick).collect();
+    let begins = beats.iter().rposition(|beat| *beat == 0).unwrap();
+    assert!(begins < before, "{begins} of {before}");
+    for pair in beats[begins..].windows(2) {
+        assert_eq!(pair[1], pair[0] + 1);
+    }
 }
