@@ -121,7 +121,7 @@ const PECK_CLEARANCE_MM: f64 = 0.254;
 const ROUNDING_MM: f64 = 1e-9;
 /// Moves of a peck: down, out to R, and back to just above where it ended.
 const MOVES_PER_PECK: f64 = 3.0;
-/// Most moves and dwells of a hole without pecks, with the two rapids to it. L of all kinds is bounded by it: a kind that makes more
+/// Most moves and dwells of a hole without pecks, with the two rapids to it. L of these kinds is bounded by it: a kind that makes more
 /// needs a number of its own.
 const MAX_MOVES_PER_HOLE: f64 = 8.0;
 /// Most moves of a line, so that memory stays bounded.
@@ -473,8 +473,8 @@ fn pecks(line: &mut Line, holes: &Holes, at: &mut AxisVector) -> Checked<()> {
     Ok(())
 }
 
-/// In and out at the feed, the spindle turned round at the bottom and again at the end. The overrides would break the
-/// thread: they are off meanwhile.
+/// In and out at the feed, the spindle turned round at the bottom and again at the end. Nothing follows the spindle: the chuck floats,
+/// and the program's feed is the speed times the pitch. The overrides would break the thread: they are off meanwhile.
 fn tap(line: &mut Line, holes: &Holes, at: &mut AxisVector, direction: i8) -> Checked<()> {
     if line.state.spindle.direction != direction {
         let way = if direction > 0 {
