@@ -43,6 +43,8 @@ pub struct PathAhead<const L: usize> {
     context: PlannerContext,
     pub(crate) route: Route<L>,
     planning: Planning<L>,
+    /// Time of a window, s.
+    window_s: f64,
     pub(crate) window: Window<L>,
     next: Window<L>,
     flat: Flat<L>,
@@ -106,6 +108,7 @@ impl<const L: usize> PathAhead<L> {
             frame,
             context: *context,
             route: Route::default(),
+            window_s: tuning.window_s(&frame),
             planning: Planning::new(tuning),
             window: Window::new(),
             next: Window::new(),
@@ -115,7 +118,7 @@ impl<const L: usize> PathAhead<L> {
             at: 0.0,
             position: frame.lanes(&context.position),
             held_s: 0.0,
-            span: Span::new(tuning.window_s),
+            span: Span::new(tuning.window_s(&frame)),
         }
     }
 
@@ -195,7 +198,7 @@ impl<const L: usize> PathAhead<L> {
         self.route.clear();
         self.at = 0.0;
         self.held_s = 0.0;
-        self.span = Span::new(self.planning.tuning.window_s);
+        self.span = Span::new(self.window_s);
         self.position = self.frame.lanes(position);
         self.driven = DrivenPath::default();
     }
@@ -344,7 +347,7 @@ impl<const L: usize> AnyCore for Core<L> {
         let driven_s = stream
             .driven_s()
             .map_or(0.0, |driven_s| ahead.front_driven_s(driven_s));
-        let enough_s = HELD.0 * ahead.planning.tuning.window_s + HELD.1;
+        let enough_s = HELD.0 * ahead.window_s + HELD.1;
         let held = ahead.route.chord_count().max(ahead.route.items.len());
         ahead.route.items.is_empty() || held < max_chords && ahead.held_s - driven_s < enough_s
     }

@@ -10,8 +10,8 @@ tandem_sdk::options! {
     pub struct Options {
         /// Step of the grid in time, ms: 0.5 to 20; with 0 it follows from tolerance, jerk and acceleration.
         pub grid_ms: f64 = 0.0,
-        /// Time that is planned at once, ms: 100 to 2000.
-        pub window_ms: f64 = 1000.0,
+        /// Time that is planned at once, ms: 100 to 5000; with 0 it follows from acceleration and jerk.
+        pub window_ms: f64 = 0.0,
         /// Share of the tolerance that the first try uses: 0.5 to 1.
         pub tolerance_share: f64 = 0.955,
         /// Turns of smoothing and retiming for a window in motion; one from rest has twice as many: 1 to 8.
@@ -42,7 +42,12 @@ impl Options {
                 if self.grid_ms == 0.0 { 0.0 } else { 0.5 },
                 20.0,
             ),
-            ("window_ms", self.window_ms, 100.0, 2000.0),
+            (
+                "window_ms",
+                self.window_ms,
+                if self.window_ms == 0.0 { 0.0 } else { 100.0 },
+                5000.0,
+            ),
             ("tolerance_share", self.tolerance_share, 0.5, 1.0),
             ("rounds", f64::from(self.rounds), 1.0, 8.0),
         ];

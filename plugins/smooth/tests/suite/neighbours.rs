@@ -35,11 +35,11 @@ fn points() -> Vec<Point> {
     points
 }
 
-/// Three axes alike.
-fn machine(acceleration_mm_per_s2: f64, position: &Point) -> PlannerContext {
+/// Three axes alike, with this much jerk in a second of the acceleration.
+fn machine(acceleration_mm_per_s2: f64, jerk_per_s: f64, position: &Point) -> PlannerContext {
     let axis = AxisLimits {
         feed_mm_per_s: 1.1 * FEED_MM_PER_S,
-        jerk_mm_per_s3: JERK_PER_S * acceleration_mm_per_s2,
+        jerk_mm_per_s3: jerk_per_s * acceleration_mm_per_s2,
         ..tandem_rig::axis(acceleration_mm_per_s2)
     };
     PlannerContext {
@@ -56,7 +56,7 @@ fn mean_over_least(acceleration_mm_per_s2: f64) -> f64 {
     let times_s: Vec<f64> = (0..MACHINES)
         .map(|n| {
             let acceleration = acceleration_mm_per_s2 * (1.0 + STRONGER * f64::from(n));
-            let context = machine(acceleration, &points[0]);
+            let context = machine(acceleration, JERK_PER_S, &points[0]);
             let mut planner = SmoothPlanner::new(&Options::default(), &context).unwrap();
             let collected = tandem_rig::drive(&mut planner, &blocks, 0.008);
             let peaks = judge(&samples(&collected.segments), &points);
@@ -81,4 +81,39 @@ fn machines_beside_each_other_take_about_as_long_on_arcs_of_short_lines() {
     let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
     println!("from {drawn:?} mm/s² on: {ratios:?}, mean {mean}");
     assert!(mean <= 1.015, "{ratios:?}");
+}
+
+/// How long the program takes on machines of this acceleration, mm/s², and jerk in a second of it, and how often it rests where it need
+/// not.
+fn driven_on(machines: &[(f64, f64)], options: &Options) -> (f64, u64) {
+    let points = points();
+    let blocks = lines(&points, FEED_MM_PER_S);
+    let (mut time_s, mut rests) = (0.0, 0);
+    for (acceleration_mm_per_s2, jerk_per_s) in machines {
+        let context = machine(*acceleration_mm_per_s2, *jerk_per_s, &points[0]);
+        let mut planner = SmoothPlanner::new(options, &context).unwrap();
+        time_s += tandem_rig::drive(&mut planner, &blocks, 0.008).duration_s();
+        rests += planner.effort().stops;
+    }
+    (time_s, rests)
+}
+
+#[test]
+fn windows_are_long_enough_for_axes_that_build_up_their_acceleration_slowly() {
+    let mut random = Random::from_the_clock();
+    // In a fifth to two thirds of a second.
+    let machines: Vec<(f64, f64)> = (0..8)
+        .map(|_| (random.length(300.0, 3000.0), random.length(1.5, 5.0)))
+        .collect();
+    let (time_s, rests) = driven_on(&machines, &Options::default());
+    let second = Options {
+        window_ms: 1000.0,
+        ..Options::default()
+    };
+    let (short_s, short_rests) = driven_on(&machines, &second);
+    let found = format!(
+        "{machines:?}: {time_s} s with {rests} rests, in windows of a second {short_s} s with {short_rests}"
+    );
+    println!("{found}");
+    assert!(time_s <= 0.995 * short_s && rests <= 1, "{found}");
 }
