@@ -306,6 +306,22 @@ mod tests {
         assert_eq!(points, Horizon::POINTS - Horizon::GRID);
     }
 
+    /// Where the queue runs dry the steps are some times as large, in that period.
+    #[test]
+    fn a_hurry_is_over_with_its_period() {
+        let segment = Segment::rest(&AxisVector::ZERO, 1.0);
+        let ahead = Ahead::new(&segment, Some(0.0), 0, None);
+        let mut horizon = Horizon::new(&[AxisLimits::unlimited(); MAX_AXES], 1, 0.002);
+        let small = MAX_RATE_CHANGE / 0.002 / 0.002;
+        for _ in 0..2 {
+            horizon.fill(&ahead, 0.002);
+            assert!((horizon.small_change_per_s2() / small - 1.0).abs() < 1e-12);
+            horizon.hurry();
+            let hurried = horizon.small_change_per_s2() / small;
+            assert!((hurried / HURRY_FACTOR - 1.0).abs() < 1e-12);
+        }
+    }
+
     /// Places lie evenly from a place behind the period to the end of the reach, where that one counts too, in however many segments they are.
     #[test]
     fn places_ahead_lie_evenly_to_the_end_of_the_reach() {

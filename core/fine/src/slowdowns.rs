@@ -479,6 +479,17 @@ mod tests {
         let mut line_end = LineEnd::default();
         cursor.advance(0.5, |_| false);
         assert!(!line_end.is_passed(&cursor), "none is chosen");
+        assert_eq!(
+            line_end.look(&mut cursor, |_| 9.0),
+            None,
+            "all are too near"
+        );
+        assert_eq!(
+            line_end.look(&mut cursor, |_| 0.0),
+            None,
+            "each is looked at once"
+        );
+        let mut line_end = LineEnd::default();
         line_end.look(&mut cursor, |_| 0.0);
         for (passes_s, is_passed) in [(0.0, false), (0.25, false), (0.25, false), (0.25, true)] {
             cursor.advance(passes_s, |_| false);

@@ -441,6 +441,11 @@ fn the_slowest_axis_decides_alike_in_both_directions() {
         assert!(wanted.is_finite(), "Y decides");
         let mirrored = wanted_by_y(path, y.map(|c| -c), rate_per_s);
         assert_eq!(wanted, mirrored, "{y:?}");
+        // It gets faster: first that is to end, with all that a stop may begin with.
+        let planned = SIGMA.powi(3) * 6.0 * y[3] + 3.0 * SIGMA * 2.0 * y[2] * rate_per_s;
+        let most = APPROACH_END_FACTOR * ORDER3_LIMIT_SHARE * 1000.0;
+        let driven = planned + y[1] * wanted;
+        assert!((driven / -most - 1.0).abs() < 1e-9, "{driven} of {most}");
     }
 }
 

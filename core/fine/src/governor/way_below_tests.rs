@@ -343,6 +343,34 @@ fn from_rest_the_rate_begins_as_high_as_can_be_lowered_in_time() {
     assert!(before < 1.0);
 }
 
+/// Where nothing ahead is too fast a rise goes on to a rate that is higher, and is not taken back to the one that is kept anyway.
+#[test]
+fn a_rise_ends_where_it_comes_to_if_the_feed_is_kept_there() {
+    const PERIOD_S: f64 = 1e-3;
+    let segment = along_x([0.0, 10.0, 0.0, 0.0, 0.0, 0.0]);
+    let horizon = Horizon::new(&limits(1000.0, 1.0, 10_000.0), 2, PERIOD_S);
+    let ahead = Ahead::new(&segment, Some(0.0), 0, None);
+    for rate_per_s in [0.1, 2.0, 10.0] {
+        let here = RateState {
+            rate_per_s,
+            ..at_rate(0.5, &ahead)
+        };
+        let mut ways = WaySearch::new(PERIOD_S);
+        let mut below = Below::new(&the_feed(0.3, &segment), &here, PERIOD_S);
+        below.steps_left = FEED_WAY_STEPS;
+        assert!(below.leaves_way(0.0, &here, &mut ways, &horizon));
+        let mut way = here;
+        way.pass(0.0, PERIOD_S);
+        let mut rates = vec![way.rate_per_s];
+        while let Some((change, _)) = ways.found.next() {
+            way.pass(change, PERIOD_S);
+            rates.push(way.rate_per_s);
+        }
+        assert!(way.sigma > 0.5 && way.rate_per_s.abs() < 1e-9, "{way:?}");
+        assert!(rates.is_sorted_by(|a, b| a >= b), "{rates:?}");
+    }
+}
+
 /// What has gone beyond an end of the range comes back only by turning round there: that is no way.
 #[test]
 fn a_way_does_not_leave_the_range_of_rates() {

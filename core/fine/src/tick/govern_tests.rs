@@ -432,19 +432,20 @@ fn at_the_ratio_of_the_plan_its_own_speed_is_driven() {
     // A little beyond twice the feed, as a fit leaves it; and the axes by as little beyond the path.
     let mut line = segment([1.0, 20.1, 0.0, 0.0, 0.0, 0.0], 10.0, 1.0);
     line.coefficients[0][1] = 20.2;
-    for order in [2, 3] {
+    for (order, rapid) in [(2, 1.0), (2, 0.9), (3, 1.0), (3, 0.9)] {
         let mut follower = follower(order, &[line]);
         follower.cursor.advance(0.1, |_| false);
         follower.governor.jump(0.98);
         for _ in 0..100 {
             let chosen = follower.govern(Request {
-                ratios: planned,
+                ratios: Ratios { rapid, ..planned },
                 ..request(Ask::Run)
             });
             let delta_s = chosen.delta_s;
             follower.cursor.advance(delta_s, |_| false);
         }
-        assert_eq!(follower.governor.sigma(), 1.0, "{order}");
+        let sigma = follower.governor.sigma();
+        assert_eq!(sigma, 1.0, "{order}, rapids at {rapid}");
     }
 }
 
@@ -510,6 +511,14 @@ fn a_rate_to_begin_with_keeps_the_feed_on_a_way_that_is_over_within_a_few_period
         let bump = segment(path, feed, duration_s);
         let mut rest = segment([0.0; 6], feed, 1.0);
         rest.path[0] = bump.path_mm(duration_s);
+        let mut steep = follower(2, &[bump, rest]);
+        let sigma = steep.ratio_from_rest(&AT_THE_FEED, f64::INFINITY);
+        let asked = steep.asked_of_period(sigma * PERIOD_S, &AT_THE_FEED, f64::INFINITY);
+        let most = asked.at_end.min(asked.mean) * (1.0 + 1e-6);
+        assert!(
+            sigma > 0.0 && sigma <= most,
+            "{lasts} {mean}: {sigma} of {most}"
+        );
         let mut follower = follower(3, &[bump, rest]);
         follower.governor.jump(1.0);
         follower.begin_below(&AT_THE_FEED);
@@ -685,4 +694,15 @@ fn the_least_that_is_asked_for_is_a_share_of_what_is_planned() {
             );
         }
     }
+}
+
+/// Standing inside the plan, at twice the feed: the period may end at the rate that keeps it, and at no higher one.
+#[test]
+fn from_a_standstill_inside_the_plan_the_rate_is_as_high_as_keeps_the_feed() {
+    let line = segment([0.0, 10.0, 0.0, 0.0, 0.0, 0.0], 5.0, 1.0);
+    let mut follower = follower(2, &[line]);
+    follower.cursor.advance(0.1, |_| false);
+    follower.governor.jump(0.0);
+    let kept = follower.kept_from_standstill(0.9, &AT_THE_FEED);
+    assert!((kept - 0.5).abs() < 1e-6, "{kept}");
 }

@@ -7,7 +7,7 @@ use std::sync::atomic::Ordering::Relaxed;
 use common::{Bench, PERIOD_S};
 use demanding::Script;
 use tandem_fine::{FaultKind, GuardMode};
-use tandem_rings::{MachineState, RestCause, Sample, StopCause};
+use tandem_rings::{MachineState, Ratio, RestCause, Sample, StopCause};
 use tandem_sdk::{EventKind, StopOn};
 
 fn tick(bench: &mut Bench, periods: u32) -> Vec<Sample> {
@@ -275,6 +275,10 @@ fn a_stop_of_the_program_is_the_cause_of_the_hold_that_it_is() {
         .collect();
     let by_program = |sample: &&Sample| sample.cause == StopCause::ProgramStop;
     assert!(held.len() > 50 && held.iter().all(by_program));
+    // Nothing behind the stop has begun.
+    let ends_mm = 20.0 * 20.0 / 999.0;
+    let stands = |sample: &&Sample| (sample.command[0] - ends_mm).abs() < 1e-9;
+    assert!(held.iter().all(stands), "{ends_mm} mm");
     let controls = &bench.host.controls;
     controls.program_hold.store(false, Relaxed);
     let samples = tick(&mut bench, 20);
@@ -332,4 +336,42 @@ fn the_number_of_the_exchange_goes_on_from_one_job_to_the_next() {
     for pair in beats[begins..].windows(2) {
         assert_eq!(pair[1], pair[0] + 1);
     }
+}
+
+#[test]
+fn ratios_that_come_after_their_tick_are_counted() {
+    let mut bench = cruising();
+    let next = bench.fine.next_tick();
+    let mut late = 0;
+    for (tick_of, is_late) in [(next + 5, false), (3, true), (next + 20, false), (7, true)] {
+        let ratio = Ratio {
+            tick: tick_of,
+            ratio: 0.8,
+        };
+        bench.host.ratios.push(ratio).unwrap();
+        tick(&mut bench, 10);
+        late += u64::from(is_late);
+        assert_eq!(bench.fine.counters().late_ratios, late);
+    }
+}
+
+/// Where the plan rests on its way the machine runs; where nothing follows it stands.
+#[test]
+fn a_machine_runs_until_the_last_rest_of_what_is_queued() {
+    let mut bench = Bench::new(GuardMode::Stop);
+    for _ in 0..3 {
+        bench.peak(20.0);
+        bench.dwell(0.01);
+    }
+    let samples = tick(&mut bench, 250);
+    let last = samples.last().unwrap();
+    let moves = samples
+        .iter()
+        .take_while(|sample| sample.command != last.command)
+        .map(|sample| sample.state)
+        .skip_while(|state| *state == MachineState::Standstill)
+        .collect::<Vec<_>>();
+    let runs = |state: &MachineState| *state == MachineState::Running;
+    assert!(moves.len() > 120 && moves.iter().all(runs), "{moves:?}");
+    assert_eq!(last.state, MachineState::Standstill);
 }
