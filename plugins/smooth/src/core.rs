@@ -7,10 +7,11 @@ use tandem_sdk::{AxisVector, Block, Curve, PlannerContext, PluginError, SegmentS
 
 use crate::flatten::{self, Flat};
 use crate::frame::Frame;
-use crate::plan::{Effort, Planning, Tuning};
+use crate::plan::{Effort, Planning};
 use crate::profile;
 use crate::route::{Item, Route};
 use crate::span::Span;
+use crate::tuning::Tuning;
 use crate::window::{Piece, Start, State, Window};
 
 /// Part of a window in which it may be left for the next. Left at 0.40 of it at the latest, the programs of docs/smooth-planner.md

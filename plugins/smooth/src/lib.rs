@@ -34,17 +34,20 @@ mod planner;
 mod profile;
 mod report;
 mod route;
+mod shares;
 mod span;
 mod timing;
 mod travel;
+mod tuning;
 mod turns;
 mod verify;
 mod waypoints;
 mod window;
 
 pub use options::Options;
-pub use plan::{Effort, Tuning};
+pub use plan::Effort;
 pub use planner::{BUFFER_CHORDS, SmoothPlanner};
+pub use tuning::Tuning;
 
 use tandem_sdk::{PlannerContext, PluginError};
 

@@ -2,7 +2,7 @@
 
 use tandem_sdk::{PluginError, PluginOptions};
 
-use crate::plan::Tuning;
+use crate::tuning::Tuning;
 
 tandem_sdk::options! {
     /// The options. All have defaults that need no change; they exist to see what they do.

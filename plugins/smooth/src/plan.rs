@@ -7,21 +7,18 @@ use tandem_motion::tube::{Lanes, Smoother, Spline, each};
 use crate::feeds::Feeds;
 use crate::frame::Frame;
 use crate::route::Run;
+use crate::shares::{FirstTry, LEFT, NO_ROOM, Room, Shares, WIDE, take_back};
 use crate::timing::{FINE_S, Mark, Reach, Timing};
 use crate::travel::Travel;
-use crate::verify::{Checked, Checker};
+use crate::tuning::{MAX_STEPS, Tuning};
+use crate::verify::Checker;
 use crate::waypoints::{Grid, INTERVALS, Keep, Timer, Waypoints};
 use crate::window::{Piece, Start, State, Window};
 
-/// Shares of the limits that the solution may take: the rest covers what lies between the places asked. Half or twice of that rest
-/// changes the times of the programs of docs/smooth-planner.md by 1 % at most, to either side.
-const JERK_SHARE: f64 = 0.995;
-const ACCELERATION_SHARE: f64 = 0.985;
-const FEED_SHARE: f64 = 0.9995;
 /// Gain of the last round that asks for another, and how many there may be. On 17 pairs of programs and limits, each on some
 /// machines beside each other, half of the gain takes 9 % more intervals for 0.02 % less time, twice as much 8 % fewer for 0.1 % more.
-/// On the machines of [`WINDOW_RAMPS`] two rounds more take 0.03 % longer than three, and four the same; where long lines meet chords of
-/// arcs and windows are short for the machine, two take 0.8 % longer and four 0.4 % less.
+/// On the machines of [`WINDOW_RAMPS`](crate::tuning::WINDOW_RAMPS) two rounds more take 0.03 % longer than three, and four the same;
+/// where long lines meet chords of arcs and windows are short for the machine, two take 0.8 % longer and four 0.4 % less.
 const MUCH: f64 = 0.02;
 const EXTRA: usize = 3;
 /// Violation of a row, as a share of its limit, beyond which there is no rate.
@@ -53,107 +50,6 @@ const ROUGH: Asked = Asked {
 };
 /// Gain of a round, as a share of the time, that is worth another.
 const GAIN: f64 = 2e-3;
-
-/// How much more of the limits than elsewhere the start in motion may take, as a share.
-#[derive(Clone, Copy, Debug)]
-struct Room {
-    acceleration: f64,
-    jerk: f64,
-}
-
-/// At rest the rate is free.
-const NO_ROOM: Room = Room {
-    acceleration: 0.0,
-    jerk: 0.0,
-};
-/// What the window before left of the limits, but for a tenth: it was planned with the shares above. With half of it the same programs
-/// take 0.04 % longer; twice as much is more than the check allows, and takes 13 % more intervals.
-const LEFT: Room = Room {
-    acceleration: 0.0132,
-    jerk: 0.006,
-};
-/// Where nothing but the timing is taken from a round. Without it no rate may be found, and the timing is then whatever the solver was
-/// at when it gave up: 2 % more intervals, and 0.08 % more time. With half or twice as much it is 0.04 % more.
-const WIDE: Room = Room {
-    acceleration: 0.2,
-    jerk: 0.2,
-};
-
-/// What can be tuned.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tuning {
-    /// Step of the grid, s, where that is not coarser than the motion; zero where the path and the limits say it.
-    pub step_s: f64,
-    /// Time of a window, s; zero where the limits say it.
-    pub window_s: f64,
-    /// Share of the boxes that is used where little lies between two samples.
-    pub box_share: f64,
-    /// Rounds of a window in motion; one from rest has twice as many.
-    pub rounds: usize,
-    /// Rounds more where the window does not pass.
-    pub repairs: usize,
-}
-
-/// Step of the grid as a share of the time of a feature. With half of it the programs of docs/smooth-planner.md take up to 0.4 % less,
-/// for twice as many intervals; with twice as much 0.3 to 9 % more.
-const STEP_SHARE: f64 = 0.76;
-/// Steps are multiples of this, s: tolerances that differ by rounding have one grid.
-const ROUND_S: f64 = 0.25e-3;
-/// Shortest and longest step that is taken by itself, s.
-const STEPS_S: (f64, f64) = (1.5e-3, 12e-3);
-/// Longest step that is taken where one is asked for, as a multiple of the one that is taken by itself: on a coarser grid the spline
-/// cannot follow the path at its speed, and comes to crawl.
-const MAX_COARSER: f64 = 2.0;
-/// Share of the most that acceleration adds between two samples that boxes leave room for, and the least share of them that is
-/// left: few motions use all of the acceleration across the path. Half of the second changes nothing; twice as much, which
-/// is beyond the tolerance, has windows refused and costs up to 2.4 % of the time.
-const BETWEEN: f64 = 0.2;
-const LEAST: f64 = 0.8;
-/// Steps of a window, without those of the stop at its end.
-const MAX_STEPS: f64 = 300.0;
-/// Time of a window as a multiple of that in which the softest axis builds up its acceleration. Each window ends in a rest, and from a
-/// state of hard braking hardly anything but the braking can be planned: a window that is short for the machine is followed by ones
-/// that are refused, and the motion comes to rest in mid-path. On six paths and ten machines whose acceleration takes 67 to 670 ms
-/// (each machine sixteen times, a thousandth stronger from one to the next) windows of a second are refused 1868 times, come to rest
-/// 222 times and take 2 % longer than these, which are refused 73 times and rest twice. With half of it the times are 0.03 % longer in
-/// the mean, 0.07 % on fourteen machines that take 10 to 100 ms; with one and a half times of it they are the same. Longer windows are no
-/// dearer: they are fewer.
-const WINDOW_RAMPS: f64 = 40.0;
-/// Shortest window that is taken by itself, s.
-const MIN_WINDOW_S: f64 = 1.0;
-
-impl Tuning {
-    /// Time of a window, s, without the stop at its end.
-    pub fn window_s<const L: usize>(&self, frame: &Frame<L>) -> f64 {
-        if self.window_s > 0.0 {
-            return self.window_s;
-        }
-        let ramp_s: Lanes<L> = each(|l| frame.acceleration[l] / frame.jerk[l]);
-        let softest_s = ramp_s[..frame.count].iter().copied().fold(0.0, f64::max);
-        MIN_WINDOW_S.max(WINDOW_RAMPS * softest_s)
-    }
-
-    /// Step of the grid for a window whose least tolerance is `tolerance`, s: where none is stated, a share of the time in which
-    /// an axis can go the tolerance at its limits, which is how long the motion takes around a feature of the path.
-    fn step_s<const L: usize>(&self, frame: &Frame<L>, tolerance: f64) -> f64 {
-        let by_jerk_s = (tolerance / frame.largest(&frame.jerk)).cbrt();
-        let by_acceleration_s = (tolerance / frame.largest(&frame.acceleration)).sqrt();
-        let step_s = STEP_SHARE * by_jerk_s.max(by_acceleration_s);
-        let step_s = (ROUND_S * (step_s / ROUND_S).round()).clamp(STEPS_S.0, STEPS_S.1);
-        if self.step_s > 0.0 {
-            self.step_s.min(MAX_COARSER * step_s)
-        } else {
-            step_s
-        }
-    }
-
-    /// Share of the boxes of such a window: what the motion does between two samples counts as much as how far these are off.
-    fn share<const L: usize>(&self, frame: &Frame<L>, tolerance: f64) -> f64 {
-        let acceleration = frame.largest(&frame.acceleration);
-        let between = acceleration * frame.period_s * frame.period_s / 8.0;
-        self.box_share * (1.0 - BETWEEN * between / tolerance).max(LEAST)
-    }
-}
 
 /// Largest factor on the step in the rounds before the last of a window in motion: of these nothing but the timing is left, and most of
 /// that is of the window before. From rest there is more to be found, and a coarse grid misses it. These rounds have a tenth fewer
@@ -210,55 +106,6 @@ pub struct Planning<const L: usize> {
     /// Step of the grid of the present window, s, and the share of its boxes that is used at first.
     step_s: f64,
     box_share: f64,
-}
-
-/// Shares of two limits that the next window takes at first. What one window had to take back between two places asked, the next one
-/// mostly has to: where it does so at once, it is not refused first. On the paths of [`WINDOW_RAMPS`] and fourteen machines whose
-/// acceleration takes 10 to 100 ms that saves half of the repairs and an eighth of the intervals; the times are the same to 0.01 %.
-#[derive(Clone, Copy, Debug)]
-struct FirstTry {
-    acceleration: f64,
-    feed: f64,
-}
-
-impl FirstTry {
-    const NOMINAL: Self = Self {
-        acceleration: ACCELERATION_SHARE,
-        feed: FEED_SHARE,
-    };
-    /// What is carried over at least: a single place of one window does not slow those behind it.
-    const MIN: Self = Self {
-        acceleration: 0.96,
-        feed: 0.997,
-    };
-    /// Part of what is lacking that comes back with each window that passes at first.
-    const BACK: f64 = 0.25;
-
-    /// After a window has passed with `shares`, at its first try or after repairs.
-    fn after(shares: &Shares, repaired: bool) -> Self {
-        if repaired {
-            return Self {
-                acceleration: shares.acceleration.max(Self::MIN.acceleration),
-                feed: shares.feed.max(Self::MIN.feed),
-            };
-        }
-        let back = |share: f64, nominal: f64| share + Self::BACK * (nominal - share);
-        Self {
-            acceleration: back(shares.acceleration, ACCELERATION_SHARE),
-            feed: back(shares.feed, FEED_SHARE),
-        }
-    }
-}
-
-/// What a round takes back.
-#[derive(Clone, Copy, Debug)]
-struct Shares {
-    jerk: f64,
-    acceleration: f64,
-    boxes: f64,
-    /// How far inside of the ends of the travel the motion is to stay, in lane units.
-    margin: f64,
-    feed: f64,
 }
 
 impl<const L: usize> Planning<L> {
@@ -327,21 +174,9 @@ impl<const L: usize> Planning<L> {
         if start.old.is_none() {
             self.first_try = FirstTry::NOMINAL;
         }
-        let mut shares = Shares {
-            jerk: JERK_SHARE,
-            acceleration: self.first_try.acceleration,
-            boxes: self.box_share,
-            margin: 0.0,
-            feed: self.first_try.feed,
-        };
+        let mut shares = self.first_try.shares(self.box_share);
         let mut before_s = self.marks[self.marks.len() - 1].t;
-        // Without the timing of a window before there is more to be found; on a fine grid a round changes less.
-        let rounds = self.tuning.rounds + usize::from(self.step_s < FINE_S);
-        let rounds = if start.old.is_none() {
-            2 * rounds
-        } else {
-            rounds
-        };
+        let rounds = self.rounds(start);
         let mut round = 1;
         let mut repairs = 0;
         let mut settled = false;
@@ -395,6 +230,17 @@ impl<const L: usize> Planning<L> {
             repairs += 1;
             round = rounds;
             self.effort.repairs += 1;
+        }
+    }
+
+    /// Rounds that a window has at least. Without the timing of a window before there is more to be found; on a fine grid a round
+    /// changes less.
+    fn rounds(&self, start: &Start<'_, L>) -> usize {
+        let rounds = self.tuning.rounds + usize::from(self.step_s < FINE_S);
+        if start.old.is_none() {
+            2 * rounds
+        } else {
+            rounds
         }
     }
 
@@ -681,43 +527,4 @@ fn resting<const L: usize>(run: &Run<'_, L>, start: &Start<'_, L>, end: f64) -> 
                 .take_while(|chord| chord.s < end)
                 .all(|chord| chord.direction[l] == 0.0)
     })
-}
-
-/// Share of the tolerance that may lie between two samples before a refused window is to turn more slowly.
-const BULGE: f64 = 0.25;
-/// Least share of the acceleration that one repair leaves it to turn with.
-const SLOWER: f64 = 0.1;
-
-/// The share of the boxes that leaves room for what lies between samples: that does not become less with them.
-fn narrower(boxes: f64, checked: &Checked) -> f64 {
-    if checked.deviation <= 1.0 {
-        return boxes;
-    }
-    let bulge = checked.bulge.min(0.5);
-    boxes * ((0.97 - bulge) / (checked.deviation - bulge)).clamp(0.7, 0.99)
-}
-
-/// Shares for the next round: what was exceeded, in proportion.
-fn take_back(shares: Shares, checked: &Checked) -> Shares {
-    let less = |share: f64, ratio: f64, aim: f64| {
-        if ratio > 1.0 {
-            share * (aim / ratio).max(0.7)
-        } else {
-            share
-        }
-    };
-    let acceleration = less(shares.acceleration, checked.acceleration, 0.998);
-    // Where the motion leaves the path between two samples, it has to turn more slowly than it does.
-    let acceleration = if checked.deviation > 1.0 && checked.bulge > BULGE {
-        acceleration.min(checked.acceleration) * (BULGE / checked.bulge).max(SLOWER)
-    } else {
-        acceleration
-    };
-    Shares {
-        jerk: less(shares.jerk, checked.jerk, 0.998),
-        acceleration,
-        margin: shares.margin + 2.0 * checked.travel.max(0.0),
-        boxes: narrower(shares.boxes, checked),
-        feed: less(shares.feed, checked.speed, 0.9995),
-    }
 }

@@ -146,8 +146,8 @@ pub struct DriverDescription {
     /// 1 where the drives themselves fault when a joint is too far from its setpoint. A real driver that does not needs
     /// `max_following_error` for each joint.
     pub watches_following: u32,
-    /// 1 where an exchange may take longer than a fine period, as on a serial line: the host calls it on a thread of its own, and
-    /// the fine loop never waits for it.
+    /// 1 where an exchange may take longer than a fine period, as of a spindle on a serial line: the host calls it on a thread of its
+    /// own, and the fine loop never waits for it. Such a driver has no joints.
     pub slow: u32,
     /// 1 where codes are written in hexadecimal, as `CiA 402` has them; 0 for decimal.
     pub hexadecimal_codes: u32,
