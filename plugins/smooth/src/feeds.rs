@@ -54,6 +54,8 @@ impl<const L: usize> Feeds<'_, L> {
 const PARTS: usize = 8;
 /// Halvings of a part at most: a motion that brakes into a lower feed is then known to a few nanoseconds.
 const HALVINGS: u32 = 16;
+/// Speed, lane units per s, below which rounding says where the motion goes: it stands, and the marks say which chord it is on.
+const STANDS: f64 = 1e-6;
 
 /// The speed of a motion beside the feeds of the chords that it is on.
 ///
@@ -213,20 +215,27 @@ impl<'a, const L: usize> Feeder<'a, L> {
 
     /// The chord that the motion is on: the marks know it to a few periods, and from there on it goes by the planes that halve the
     /// angles at vertices, on either side of which one of the two chords is the nearer one. Where the path turns back, both are near on
-    /// either side, and a motion that cuts the corner may never pass the plane: it is on the second when it moves away from the vertex.
+    /// either side, and a motion that cuts the corner may never pass the plane: it is on the second when it moves away from the vertex. At the
+    /// rest that a window ends in it moves nowhere.
     fn chord_at(&self, window: &Window<L>, t: f64) -> usize {
         let chords = self.run.chords;
         let (piece, piece_t) = self.piece_at(window, t);
         let at = piece.position(piece_t);
+        let velocity = piece.velocity(piece_t);
+        let stands = dot(&velocity, &velocity) <= STANDS * STANDS;
+        let marked = self.run.chord_at(window.along(t), self.chord);
         let is_passed = |vertex: usize| {
             let [before, behind] = [&chords[vertex - 1], &chords[vertex]];
             let way = minus(&at, &behind.start);
             if before.turns_back_to(behind) {
-                return dot(&way, &piece.velocity(piece_t)) > 0.0;
+                return if stands {
+                    vertex <= marked
+                } else {
+                    dot(&way, &velocity) > 0.0
+                };
             }
             dot(&way, &before.direction) + dot(&way, &behind.direction) > 0.0
         };
-        let marked = self.run.chord_at(window.along(t), self.chord);
         let mut i = marked;
         while i > 0 && !is_passed(i) {
             i -= 1;
@@ -434,5 +443,30 @@ mod tests {
             let chords = [0.9, 1.1, 1.5].map(|t| feeder.chord_at(&window, t));
             assert_eq!(chords, [0, 1, 1], "{late}");
         }
+    }
+
+    #[test]
+    fn a_window_that_rests_behind_a_turn_back_has_the_feeds_of_both_chords() {
+        let mut chords = lines(&[[0.0, 0.0], [5.0, 0.0], [0.0, 0.02]]);
+        (chords[0].feed, chords[1].feed) = (50.0, 20.0);
+        let run = open(&chords);
+        let mut window = Window::<2>::new();
+        let rest = |x: f64| [[x, 0.0], [0.0; 2], [0.0; 2]];
+        for (n, [from, to]) in [[1.0, 4.9], [4.9, 3.0]].into_iter().enumerate() {
+            let piece = Piece::between(&rest(from), &rest(to), n as f64, 1.0);
+            window.pieces.push(piece);
+        }
+        window.marks = [(0.0, 1.0), (1.0, 5.0), (2.0, 7.0)]
+            .map(|(t, s)| Mark { t, s })
+            .to_vec();
+        let mut feeder = Feeder::new(&run, &[1.0; 2], 1e-3, &rest_at_start(), &window);
+        assert_eq!(feeder.chord_at(&window, 2.0), 1);
+        assert_eq!(feeder.range(&window, 1), (20.0, 50.0));
+        // On the way back it is 1.8 times as fast in its middle as in the mean.
+        assert!(feeder.peak(&window, 1, 1e3) < 1.0);
+        chords[1].feed = 3.0;
+        let run = open(&chords);
+        let feeder = Feeder::new(&run, &[1.0; 2], 1e-3, &rest_at_start(), &window);
+        assert!(feeder.peak(&window, 1, 1e3) > 1.1);
     }
 }
