@@ -44,8 +44,6 @@ pub struct PathAhead<const L: usize> {
     context: PlannerContext,
     pub(crate) route: Route<L>,
     planning: Planning<L>,
-    /// Time of a window, s.
-    window_s: f64,
     pub(crate) window: Window<L>,
     next: Window<L>,
     flat: Flat<L>,
@@ -109,7 +107,6 @@ impl<const L: usize> PathAhead<L> {
             frame,
             context: *context,
             route: Route::default(),
-            window_s: tuning.window_s(&frame),
             planning: Planning::new(tuning),
             window: Window::new(),
             next: Window::new(),
@@ -199,7 +196,7 @@ impl<const L: usize> PathAhead<L> {
         self.route.clear();
         self.at = 0.0;
         self.held_s = 0.0;
-        self.span = Span::new(self.window_s);
+        self.span.restart();
         self.position = self.frame.lanes(position);
         self.driven = DrivenPath::default();
     }
@@ -348,7 +345,7 @@ impl<const L: usize> AnyCore for Core<L> {
         let driven_s = stream
             .driven_s()
             .map_or(0.0, |driven_s| ahead.front_driven_s(driven_s));
-        let enough_s = HELD.0 * ahead.window_s + HELD.1;
+        let enough_s = HELD.0 * ahead.span.asked_s() + HELD.1;
         let held = ahead.route.chord_count().max(ahead.route.items.len());
         ahead.route.items.is_empty() || held < max_chords && ahead.held_s - driven_s < enough_s
     }

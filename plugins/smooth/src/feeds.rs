@@ -221,13 +221,13 @@ impl<'a, const L: usize> Feeder<'a, L> {
         let chords = self.run.chords;
         let (piece, piece_t) = self.piece_at(window, t);
         let at = piece.position(piece_t);
-        let velocity = piece.velocity(piece_t);
-        let stands = dot(&velocity, &velocity) <= STANDS * STANDS;
         let marked = self.run.chord_at(window.along(t), self.chord);
         let is_passed = |vertex: usize| {
             let [before, behind] = [&chords[vertex - 1], &chords[vertex]];
             let way = minus(&at, &behind.start);
             if before.turns_back_to(behind) {
+                let velocity = piece.velocity(piece_t);
+                let stands = dot(&velocity, &velocity) <= STANDS * STANDS;
                 return if stands {
                     vertex <= marked
                 } else {

@@ -34,18 +34,15 @@ impl Options {
     /// # Errors
     /// A value out of range.
     pub fn check(&self) -> Result<(), PluginError> {
+        // Zero leaves it to the machine.
+        let or_zero = |value: f64, low: f64| if value == 0.0 { 0.0 } else { low };
         // The ranges are asked in this form because a comparison with NaN is false.
         let ranges = [
-            (
-                "grid_ms",
-                self.grid_ms,
-                if self.grid_ms == 0.0 { 0.0 } else { 0.5 },
-                20.0,
-            ),
+            ("grid_ms", self.grid_ms, or_zero(self.grid_ms, 0.5), 20.0),
             (
                 "window_ms",
                 self.window_ms,
-                if self.window_ms == 0.0 { 0.0 } else { 100.0 },
+                or_zero(self.window_ms, 100.0),
                 5000.0,
             ),
             ("tolerance_share", self.tolerance_share, 0.5, 1.0),

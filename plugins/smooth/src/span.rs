@@ -31,6 +31,16 @@ impl Span {
         }
     }
 
+    /// How long windows are to be, s.
+    pub fn asked_s(&self) -> f64 {
+        self.asked_s
+    }
+
+    /// Another path begins: as long as asked.
+    pub fn restart(&mut self) {
+        self.now_s = self.asked_s;
+    }
+
     /// How long the next window is, s.
     pub fn now_s(&self) -> f64 {
         self.now_s
