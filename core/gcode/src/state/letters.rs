@@ -2,7 +2,7 @@
 
 use tandem_sdk::{Axes, MAX_AXES};
 
-/// Index of a letter: 0 for A.
+/// Index of a letter: 0 for A. `$` has none.
 pub(crate) const fn index(letter: u8) -> usize {
     (letter - b'A') as usize
 }
@@ -10,16 +10,21 @@ pub(crate) const fn index(letter: u8) -> usize {
 /// The word `$`, which names a spindle, in a mask of letters.
 pub(crate) const SPINDLE_BIT: u32 = 1 << 26;
 
+/// The bit of a letter, or of `$`, in a mask of letters.
+pub(crate) const fn bit(letter: u8) -> u32 {
+    match letter {
+        b'$' => SPINDLE_BIT,
+        letter => 1 << index(letter),
+    }
+}
+
 /// The set of `letters` as a mask, bit 0 for A. `$` may be among them.
 pub(crate) const fn mask(letters: &str) -> u32 {
     let letters = letters.as_bytes();
     let mut mask = 0;
     let mut at = 0;
     while at < letters.len() {
-        mask |= match letters[at] {
-            b'$' => SPINDLE_BIT,
-            letter => 1 << index(letter),
-        };
+        mask |= bit(letters[at]);
         at += 1;
     }
     mask
@@ -49,7 +54,7 @@ impl Letters {
         for axis in 0..axes.count() {
             this.names[axis] = axes.letter(axis) as u8;
             this.rotary[axis] = axes.is_rotary(axis);
-            this.mask |= 1 << index(this.names[axis]);
+            this.mask |= bit(this.names[axis]);
         }
         this
     }

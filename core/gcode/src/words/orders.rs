@@ -3,7 +3,7 @@
 use super::{Action, GROUPS, Group, Shape, Word, written};
 use crate::line_error::{Checked, LineError, Span};
 use crate::state::MotionMode;
-use crate::state::letters::{AXIS_MASK, Letters, SPINDLE_BIT, index, mask};
+use crate::state::letters::{AXIS_MASK, Letters, SPINDLE_BIT, bit, mask};
 use crate::syntax::line_words::{Code, LineWords, Polar};
 
 /// Letters that any line may have.
@@ -349,7 +349,7 @@ fn misplaced(words: &LineWords, claimed: u32, letters: &Letters) -> LineError {
     let useless = !(ALWAYS | claimed) | foreign;
     let (letter, span) = words.first_of(useless).unwrap_or_default();
     let name = letter as char;
-    if letter.is_ascii_uppercase() && foreign >> index(letter) & 1 != 0 {
+    if letter.is_ascii_uppercase() && foreign & bit(letter) != 0 {
         return no_axis(letter, span, letters);
     }
     let takers = takers(letter);

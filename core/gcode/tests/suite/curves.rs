@@ -218,6 +218,10 @@ fn what_is_missing_is_named() {
         &["3:4 [unused-word] S has no place in this line of a curve"],
     );
     assert_messages(
+        "F60\nG5.2\nX1 $0\nX2\nG5.3",
+        &["3:4 [unused-word] $ has no place in this line of a curve"],
+    );
+    assert_messages(
         "F60\nG5.2\nX1 B3\nX2\nG5.3",
         &["3:4 [axis] this machine has no axis B; it has X Y Z A"],
     );

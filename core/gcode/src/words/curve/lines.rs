@@ -6,7 +6,7 @@ use tandem_sdk::AxisVector;
 use super::{Curve, Dialect, open_curve};
 use crate::line::Line;
 use crate::line_error::{Checked, LineError, show};
-use crate::state::letters::{AXIS_MASK, index, mask};
+use crate::state::letters::{AXIS_MASK, bit, mask};
 use crate::words::orders::no_axis;
 
 /// Orders (degree + 1) that can be asked for.
@@ -260,7 +260,7 @@ fn only(line: &Line, letters: &str) -> Checked<()> {
     let Some((letter, span)) = line.words.first_of(foreign) else {
         return Ok(());
     };
-    if axes >> index(letter) & 1 != 0 {
+    if axes & bit(letter) != 0 {
         return Err(no_axis(letter, span, line.letters));
     }
     let message = format!(
