@@ -180,7 +180,7 @@ pub fn is_moving(status: &Value) -> bool {
 }
 
 pub fn is_held(status: &Value) -> bool {
-    status["state"] == "holding" && status["feed_mm_per_min"] == 0.0
+    status["state"] == "holding" && status["at_rest"] == true
 }
 
 #[test]

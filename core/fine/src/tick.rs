@@ -127,7 +127,8 @@ impl FineLoop {
         let recorded = (self.outputs.unhomed == 0 || self.config.record_drives)
             && self.phase.handed_over() == 0;
         let switched = self.switched();
-        if started && recorded && !had_ended && !self.outputs.ended {
+        let is_sampled = started && recorded && !had_ended && !self.outputs.ended;
+        if is_sampled {
             let feed = (self.rate.cursor().path_mm() - before_mm) / self.config.period_s;
             self.publish(&position, feed, switched);
         }
@@ -138,8 +139,10 @@ impl FineLoop {
             tick: self.tick,
             state: self.state,
             is_faulted: self.fault.is_some(),
+            end_feed_mm_per_s: self.end_feed_mm_per_s(),
             waits_for_spindle: self.spin_up.waits(),
             all_hold: self.actuation.all_hold(),
+            is_sampled,
         };
         let drives = self.actuation.drives();
         self.report
@@ -711,6 +714,15 @@ impl FineLoop {
         self.actuation.place(&self.config, joints, &position);
     }
 
+    /// Path speed at the end of the period, mm/s. Off the plan nothing is fed: σ keeps what it was when the fault came.
+    fn end_feed_mm_per_s(&self) -> f64 {
+        if self.fault.is_some() {
+            0.0
+        } else {
+            self.rate.end_feed_mm_per_s()
+        }
+    }
+
     fn publish(&mut self, command: &AxisVector, feed_mm_per_s: f64, switched: Switched) {
         let reported = self.actuation.drives().feedback().position;
         let (command, feedback) = if self.config.record_drives {
@@ -722,6 +734,7 @@ impl FineLoop {
         let drives = self.actuation.drives();
         let (answer, segment) = (drives.feedback(), self.rate.cursor().segment());
         let given = self.operator.inputs();
+        let end_feed_mm_per_s = self.end_feed_mm_per_s();
         self.counters.samples += 1;
         self.report.publish(|| Sample {
             tick: self.tick,
@@ -733,7 +746,7 @@ impl FineLoop {
             speed: answer.speed,
             current_a: answer.current_a,
             feed_mm_per_s,
-            end_feed_mm_per_s: self.rate.end_feed_mm_per_s(),
+            end_feed_mm_per_s,
             programmed_feed_mm_per_s: segment.feed_mm_per_s,
             sigma: self.rate.sigma(),
             ratio,

@@ -119,6 +119,9 @@ pub struct Status {
     pub program_time_s: AtomicF64,
     /// Path speed commanded, mm/s.
     pub feed_mm_per_s: AtomicF64,
+    /// The first fine period behind the last one with a sample in which something moved: a sample from before it shows a place that
+    /// the machine may have left. The host takes it back to 0 where it knows by itself where the machine stands.
+    pub rests_from_tick: AtomicU64,
     /// Program line that moves.
     pub line: AtomicU32,
     /// A [`crate::MachineState`] as its number.

@@ -40,10 +40,13 @@ pub(super) struct Present {
     /// Number of the fine period that comes next.
     pub(super) tick: u64,
     pub(super) state: MachineState,
-    /// There is a fault: off the plan nothing is fed, waited for or enabled.
+    /// There is a fault: off the plan nothing is waited for or enabled.
     pub(super) is_faulted: bool,
+    pub(super) end_feed_mm_per_s: f64,
     pub(super) waits_for_spindle: bool,
     pub(super) all_hold: bool,
+    /// A sample of this period was handed out, or lost for want of room.
+    pub(super) is_sampled: bool,
 }
 
 /// Where samples and the state of the machine go.
@@ -120,12 +123,11 @@ impl Report {
         let (setpoint, feedback) = (drives.setpoint(), drives.feedback());
         status.tick.store(present.tick, Relaxed);
         status.program_time_s.store(cursor.program_time_s());
-        // Off the plan nothing is fed, as in the samples: σ keeps what it was when the fault came.
-        status.feed_mm_per_s.store(if present.is_faulted {
-            0.0
-        } else {
-            rate.end_feed_mm_per_s()
-        });
+        status.feed_mm_per_s.store(present.end_feed_mm_per_s);
+        let moves = present.end_feed_mm_per_s != 0.0 || present.state == MachineState::Stopping;
+        if moves && present.is_sampled {
+            status.rests_from_tick.store(present.tick, Relaxed);
+        }
         status.line.store(cursor.segment().line, Relaxed);
         status.state.store(present.state as u32, Relaxed);
         status.inputs.store(feedback.inputs, Relaxed);

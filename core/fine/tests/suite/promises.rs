@@ -2,6 +2,7 @@
 
 use crate::{common, demanding};
 
+use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 
 use common::{Bench, PERIOD_S};
@@ -311,6 +312,36 @@ fn a_sample_says_how_fast_the_path_was_driven_in_its_period_and_at_its_end() {
 }
 
 /// Drives that count the beats of their bus notice no change of jobs.
+/// Samples come to the host later than the word that nothing moves: who reads both can tell which samples are older than the rest.
+#[test]
+fn the_first_period_behind_a_motion_is_told_and_stays() {
+    for hold in [true, false] {
+        let mut bench = cruising();
+        let status = Arc::clone(&bench.host.status);
+        let now = status.tick.load(Relaxed);
+        assert_eq!(status.rests_from_tick.load(Relaxed), now);
+        if hold {
+            bench.host.controls.hold.store(true, Relaxed);
+        } else {
+            bench.host.controls.emergency_stop.store(true, Relaxed);
+        }
+        let samples = tick(&mut bench, 500);
+        let moves = |sample: &&Sample| {
+            sample.end_feed_mm_per_s != 0.0 || sample.state == MachineState::Stopping
+        };
+        let last = samples.iter().filter(moves).next_back().unwrap();
+        assert_eq!(
+            status.rests_from_tick.load(Relaxed),
+            last.tick + 1,
+            "hold {hold}"
+        );
+        assert!(last.tick + 1 < status.tick.load(Relaxed));
+        let place = samples.last().unwrap().command;
+        let behind = samples.iter().filter(|sample| sample.tick > last.tick + 1);
+        assert!(behind.into_iter().all(|sample| sample.command == place));
+    }
+}
+
 #[test]
 fn the_number_of_the_exchange_goes_on_from_one_job_to_the_next() {
     let job = || demanding::Bench::new(&demanding::config(1), Script::new(1));

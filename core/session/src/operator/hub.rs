@@ -36,6 +36,8 @@ pub struct OperatorHub {
 #[derive(Debug)]
 struct Latest {
     position: AxisVector,
+    /// The fine period of that position.
+    tick: u64,
     /// Nothing has moved in the period of that position, as far as it is known.
     rests: bool,
     sigma: f64,
@@ -55,6 +57,7 @@ impl OperatorHub {
     pub fn new(machine: &Machine, controls: Arc<Controls>, status: Arc<Status>) -> Self {
         let latest = Latest {
             position: machine.start,
+            tick: 0,
             rests: true,
             sigma: 1.0,
             progress: 0.0,
@@ -169,7 +172,7 @@ impl OperatorHub {
         latest.waits_on_line = None;
         latest.waits_for_reset = false;
         latest.ended = false;
-        latest.rests = true;
+        self.rest(&mut latest);
         latest.progress = 0.0;
         latest.sigma = 1.0;
         drop(latest);
@@ -180,7 +183,14 @@ impl OperatorHub {
     pub fn stands_at(&self, position: &AxisVector) {
         let mut latest = self.latest();
         latest.position = *position;
+        self.rest(&mut latest);
+    }
+
+    /// Nothing moves, and no sample is to come that says so.
+    fn rest(&self, latest: &mut Latest) {
+        latest.tick = 0;
         latest.rests = true;
+        self.status.rests_from_tick.store(0, Relaxed);
     }
 
     /// Where the machine is by the last sample, mm or rad.
@@ -219,6 +229,7 @@ impl OperatorHub {
     pub fn sample(&self, sample: &Sample, progress: f64) {
         let mut latest = self.latest();
         latest.position = sample.command;
+        latest.tick = sample.tick;
         latest.sigma = sample.sigma;
         latest.progress = progress;
         latest.rests = sample.feed_mm_per_s == 0.0 && sample.state != MachineState::Stopping;
@@ -278,7 +289,7 @@ impl OperatorHub {
                 status.feed_mm_per_s.load() == 0.0 && !drive_states::is_homing(status)
             }
         };
-        stands && latest.rests
+        stands && latest.rests && latest.tick >= status.rests_from_tick.load(Relaxed)
     }
 
     /// The line on which the program waits, if it does.

@@ -7,8 +7,17 @@ use std::time::Duration;
 
 use serde_json::Value;
 use tandem_machine::Machine;
+use tandem_rings::{MachineState, Sample, Status};
+use tandem_sdk::AxisVector;
 
 use super::*;
+
+fn machine() -> Machine {
+    let path =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-3axis.toml");
+    let ratio = ("motion.max_feed_ratio".to_string(), "1.5".to_string());
+    Machine::read(&path, &[ratio]).unwrap()
+}
 
 struct Room {
     hub: OperatorHub,
@@ -18,16 +27,8 @@ struct Room {
 
 impl Room {
     fn new() -> Self {
-        let path =
-            Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machines/mill-3axis.toml");
-        let machine = Machine::read(
-            &path,
-            &[("motion.max_feed_ratio".to_string(), "1.5".to_string())],
-        )
-        .unwrap();
-        let hub = OperatorHub::new(&machine, Arc::default(), Arc::default());
         Self {
-            hub,
+            hub: OperatorHub::new(&machine(), Arc::default(), Arc::default()),
             lease: Lease::default(),
             now: Instant::now(),
         }
@@ -51,6 +52,38 @@ impl Room {
         assert!(!answer["ok"].is_null() && !last, "{line}: {answer}");
         answer["ok"].clone()
     }
+}
+
+/// Samples come later than the word of the fine loop: a place that is older than a motion is none where the machine rests.
+#[test]
+fn it_rests_where_it_is_shown_or_not_yet() {
+    let status = Arc::<Status>::default();
+    let hub = OperatorHub::new(&machine(), Arc::default(), Arc::clone(&status));
+    let sample = |tick: u64, x_mm: f64, feed_mm_per_s: f64| {
+        let sample = Sample {
+            tick,
+            command: AxisVector::from_slice(&[x_mm]),
+            feed_mm_per_s,
+            state: MachineState::Holding,
+            ..Sample::default()
+        };
+        hub.sample(&sample, 0.0);
+        hub.is_at_rest()
+    };
+    status.state.store(MachineState::Holding as u32, Relaxed);
+    assert!(hub.is_at_rest(), "nothing has moved");
+    // It moves from period 3 and stands again from period 10 on, while the host sees what was before.
+    status.rests_from_tick.store(10, Relaxed);
+    let shown = [(2, 0.0, 0.0), (5, 0.1, 8.0), (9, 0.2, 1.0)];
+    assert!(
+        shown
+            .iter()
+            .all(|(tick, x, feed)| !sample(*tick, *x, *feed))
+    );
+    assert!(sample(10, 0.2, 0.0));
+    // The next job counts from 0 again.
+    hub.stands_at(&AxisVector::from_slice(&[0.2]));
+    assert!(hub.is_at_rest() && sample(0, 0.2, 0.0));
 }
 
 const TAKE: &str = r#"{"lease":"take"}"#;

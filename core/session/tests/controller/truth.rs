@@ -416,7 +416,8 @@ fn a_machine_that_is_said_to_rest_stays_where_it_is_shown() {
         ("jog", json!({ "stop": true })),
     ];
     for (stop, with) in stops {
-        for _ in 0..3 {
+        // Every other stop comes before the host has seen much of the motion.
+        for soon in [false, true, false, true, false, true] {
             let mut says = Says::new();
             if stop == "jog" {
                 let jog = json!({ "axis": "x", "distance_mm": 90.0, "feed_mm_per_min": 6000.0 });
@@ -424,7 +425,12 @@ fn a_machine_that_is_said_to_rest_stays_where_it_is_shown() {
             } else {
                 says.ask(1000, "mdi", json!({ "line": "G1 X90 F6000" }));
             }
-            says.ask(200 + random.below(300), stop, with.clone());
+            let after = if soon {
+                2 + random.below(20)
+            } else {
+                200 + random.below(300)
+            };
+            says.ask(after, stop, with.clone());
             let asked: Vec<_> = (0..300).map(|_| says.ask(1, "status", json!({}))).collect();
             let mill = machine("mill-3axis.toml");
             let told = Told::by(&mill, says, |_| (), Box::new(NoPersistence));
@@ -439,7 +445,7 @@ fn a_machine_that_is_said_to_rest_stays_where_it_is_shown() {
             let rest = shown.iter().position(|(rests, _)| *rests).unwrap();
             // 100 mm/s are gone after a tenth of a second.
             assert!(
-                (90..150).contains(&rest),
+                soon || (90..150).contains(&rest),
                 "{stop}, TANDEM_SEED={seed}: {rest}"
             );
             let place = shown[rest];
@@ -452,7 +458,7 @@ fn a_machine_that_is_said_to_rest_stays_where_it_is_shown() {
             let held = held.filter(|told| told["state"] == "held");
             let words: Vec<_> = held.map(|told| told["at_rest"] == true).collect();
             let expected: &[bool] = if stop == "hold" { &[false, true] } else { &[] };
-            assert_eq!(words, expected, "{stop}");
+            assert!(soon || words == expected, "{stop}: {words:?}");
         }
     }
 }
