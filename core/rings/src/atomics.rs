@@ -13,11 +13,13 @@ impl AtomicF64 {
     }
 
     /// The value. What was written before the store is visible.
+    #[inline]
     pub fn load(&self) -> f64 {
         f64::from_bits(self.0.load(Ordering::Acquire))
     }
 
     /// Stores `value`.
+    #[inline]
     pub fn store(&self, value: f64) {
         self.0.store(value.to_bits(), Ordering::Release);
     }

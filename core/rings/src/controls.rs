@@ -74,6 +74,7 @@ pub struct JointStatus(AtomicU64);
 
 impl JointStatus {
     /// What the drive has said. Fine loop; does not allocate.
+    #[inline]
     pub fn store(&self, state: JointState, code: u32) {
         self.0
             .store(u64::from(state.0) << 32 | u64::from(code), Relaxed);
