@@ -2,7 +2,7 @@
 
 use rtrb::Consumer;
 use tandem_rings::Queued;
-use tandem_sdk::{AxisVector, Edge, Segment, SegmentFlags, StopOn, derivatives};
+use tandem_sdk::{AxisVector, Edge, Segment, SegmentFlags, StopOn, derivatives, polynomial};
 
 use crate::plan_ahead::{Ahead, ends};
 use crate::steps::{Recent, Steps};
@@ -78,9 +78,14 @@ impl Cursor {
         self.start_s + self.local_s
     }
 
-    /// Planned position here.
-    pub fn position(&self) -> AxisVector {
-        self.segment.position(self.local_s)
+    /// Planned position here of the first `lanes` axes; the others are none.
+    #[inline]
+    pub fn position(&self, lanes: usize) -> AxisVector {
+        let mut position = AxisVector::ZERO;
+        let each = position.0[..lanes].iter_mut();
+        each.zip(&self.segment.coefficients)
+            .for_each(|(value, c)| *value = polynomial(c, self.local_s));
+        position
     }
 
     /// Planned path speed here, mm/s of program time.

@@ -32,8 +32,7 @@ const INPUTS: usize = 9;
 
 /// The state after an input. A fault is sticky until reset, and a machine starts faulted.
 pub fn next(state: MachineState, input: Input) -> MachineState {
-    let (_, row) = TABLE[state as usize];
-    row[input as usize]
+    TABLE[state as usize].1[input as usize]
 }
 
 /// One row a state in the order of its number: the state after each input, in the order of [`Input`].

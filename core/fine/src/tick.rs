@@ -330,7 +330,7 @@ impl FineLoop {
         let (cursor, drives) = (self.rate.cursor(), self.actuation.drives());
         self.stops
             .begin_edge(cursor.segment(), drives, &self.config);
-        let mut position = cursor.position();
+        let mut position = cursor.position(self.config.lane_count());
         self.add_joints(&mut position);
         let checked = self.actuation.check(&position, self.outputs.unhomed);
         self.counters.jerk_relaxed_samples += u64::from(checked.relaxed);
