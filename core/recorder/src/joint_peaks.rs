@@ -122,8 +122,13 @@ impl JointWatch {
 }
 
 /// Raises every entry of `peak` to the magnitude of the entry of `now`, where that is a larger number.
-pub(crate) fn raise(peak: &mut AxisVector, now: &AxisVector) {
+fn raise(peak: &mut AxisVector, now: &AxisVector) {
     for (peak, now) in peak.0.iter_mut().zip(now.0) {
-        *peak = if now.abs() > *peak { now.abs() } else { *peak };
+        *peak = larger(*peak, now.abs());
     }
+}
+
+/// The larger number; the first where the second is none.
+pub(crate) fn larger(most: f64, value: f64) -> f64 {
+    if value > most { value } else { most }
 }

@@ -2,10 +2,10 @@
 
 use tandem_machine::Machine;
 use tandem_rings::Sample;
-use tandem_sdk::{Axes, AxisVector, Block, BlockKind, BlockReport, Curve};
+use tandem_sdk::{Axes, AxisVector, Block, BlockKind, BlockReport, Curve, MAX_AXES};
 
 use crate::block_times::{BlockTimes, TimeGoesTo};
-use crate::joint_peaks::{JointWatch, raise};
+use crate::joint_peaks::{JointWatch, larger};
 use crate::path_watch::PathWatch;
 use crate::record::age;
 use crate::stops::StopWatch;
@@ -15,7 +15,7 @@ use crate::worst::Worst;
 pub struct Monitor {
     rapid_mm_per_s: Vec<f64>,
     period_s: f64,
-    last: [AxisVector; 3],
+    last: [[f64; 3]; MAX_AXES],
     last_tick: u64,
     /// Samples seen.
     pub samples: u64,
@@ -60,7 +60,7 @@ impl Monitor {
                 .collect(),
             period_s: machine.fine_period_s,
             last_tick: 0,
-            last: [AxisVector::ZERO; 3],
+            last: [[0.0; 3]; MAX_AXES],
             samples: 0,
             peaks: [AxisVector::ZERO; 3],
             blocks: 0,
@@ -122,7 +122,7 @@ impl Monitor {
     pub fn sample(&mut self, sample: &Sample, each: bool) -> f64 {
         // A drive that homes its joint by itself has no samples; where it stands then is no motion.
         if self.samples == 0 || sample.tick != self.last_tick + 1 {
-            self.last = [sample.command, AxisVector::ZERO, AxisVector::ZERO];
+            self.last = sample.command.0.map(|position| [position, 0.0, 0.0]);
         }
         self.stops.sample(sample);
         let age_periods = age(sample);
@@ -138,20 +138,29 @@ impl Monitor {
         };
         self.times.sample(sample, part, |_, _| {});
         self.samples += 1;
-        let per_s = 1.0 / self.period_s;
-        let velocity = (sample.command - self.last[0]) * per_s;
-        let acceleration = (velocity - self.last[1]) * per_s;
-        let jerk = (acceleration - self.last[2]) * per_s;
-        for (peak, now) in self.peaks.iter_mut().zip([&velocity, &acceleration, &jerk]) {
-            raise(peak, now);
-        }
-        self.worst.sample(sample, [&velocity, &acceleration, &jerk]);
-        self.last = [sample.command, velocity, acceleration];
+        self.look_at_motion(sample);
         self.last_tick = sample.tick;
         if let Some(joints) = &mut self.joints {
             joints.sample(&sample.command);
         }
         self.position = sample.command;
         self.watch.sample(sample.block, &sample.command, each)
+    }
+
+    /// How each axis has moved up to `sample`.
+    fn look_at_motion(&mut self, sample: &Sample) {
+        let per_s = 1.0 / self.period_s;
+        let each = self.last[..self.axes.count()].iter_mut();
+        for (axis, (last, position)) in each.zip(&sample.command.0).enumerate() {
+            let velocity = (position - last[0]) * per_s;
+            let acceleration = (velocity - last[1]) * per_s;
+            let jerk = (acceleration - last[2]) * per_s;
+            *last = [*position, velocity, acceleration];
+            let motion = [velocity, acceleration, jerk];
+            for (peak, now) in self.peaks.iter_mut().zip(motion) {
+                peak[axis] = larger(peak[axis], now.abs());
+            }
+            self.worst.sample(axis, motion, sample);
+        }
     }
 }
