@@ -36,6 +36,7 @@ pub struct JobEnd {
 }
 
 /// What the status says of a period beside what the plan and the drives do.
+#[allow(clippy::struct_excessive_bools)] // independent facts of one period
 pub(super) struct Present {
     /// Number of the fine period that comes next.
     pub(super) tick: u64,
