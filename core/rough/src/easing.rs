@@ -51,7 +51,7 @@ impl Easing {
             let mut look = |n: usize, [velocity, _, jerk]: [f64; 3]| {
                 if velocity != 0.0 {
                     whole[n] = smaller(whole[n], limit / velocity.abs());
-                    let rest = limit + velocity.signum() * jerk;
+                    let rest = limit + 1.0_f64.copysign(velocity) * jerk;
                     left[n] = smaller(left[n], rest / velocity.abs());
                 }
             };

@@ -1,6 +1,6 @@
 //! Where segments of order 3 meet: whether velocity or acceleration step there.
 
-use tandem_sdk::{AxisVector, MAX_AXES, Segment, SegmentFlags};
+use tandem_sdk::{MAX_AXES, Segment, SegmentFlags, derivatives};
 
 /// Steps below these are rounding on any machine: of velocity, mm/s, and of acceleration, mm/s².
 pub const ROUNDING: [f64; 2] = [1e-4, 0.1];
@@ -8,60 +8,57 @@ pub const ROUNDING: [f64; 2] = [1e-4, 0.1];
 /// How the last segment ended.
 #[derive(Clone, Copy, Debug)]
 pub struct JunctionSteps {
-    /// Velocity and acceleration; none at a rest, and of plans that keep no jerk.
-    end: Option<[AxisVector; 2]>,
+    /// Axes that are looked at: the first ones of a segment.
+    lanes: usize,
+    /// Velocity and acceleration of each at the end.
+    ends: [[f64; 2]; MAX_AXES],
+    /// They count: not behind a rest, and of plans that keep no jerk.
+    counts: bool,
     /// Steps up to these do not count: of velocity, mm/s, and of acceleration, mm/s².
     rounding: [f64; 2],
 }
 
 impl JunctionSteps {
-    /// Behind a rest.
-    pub fn new(rounding: [f64; 2]) -> Self {
+    /// Behind a rest of a machine with so many axes and joints that are planned.
+    pub fn new(lanes: usize, rounding: [f64; 2]) -> Self {
         Self {
-            end: None,
+            lanes,
+            ends: [[0.0; 2]; MAX_AXES],
+            counts: false,
             rounding,
         }
     }
 
     /// Behind a rest again.
     pub fn restart(&mut self) {
-        self.end = None;
+        self.counts = false;
     }
 
     /// Whether velocity or acceleration step where `segment` begins, which follows the last one.
     pub fn is_step_at(&mut self, segment: &Segment) -> bool {
-        let before = self.end.take();
+        let counted = std::mem::take(&mut self.counts);
         if segment.order < 3 || segment.duration_s == 0.0 {
             return false;
         }
-        if !segment.flags.contains(SegmentFlags::ENDS_AT_REST) {
-            self.end = Some(derivatives(segment, segment.duration_s));
+        self.counts = !segment.flags.contains(SegmentFlags::ENDS_AT_REST);
+        let [of_velocity, of_acceleration] = self.rounding;
+        let mut steps = false;
+        let ends = self.ends[..self.lanes].iter_mut();
+        for (end, c) in ends.zip(&segment.coefficients) {
+            // At the start they are coefficients.
+            steps |= (c[1] - end[0]).abs() > of_velocity;
+            steps |= (2.0 * c[2] - end[1]).abs() > of_acceleration;
+            let [velocity, acceleration, _] = derivatives(c, segment.duration_s);
+            *end = [velocity, acceleration];
         }
-        let start = derivatives_at_start(segment);
-        before.is_some_and(|end| {
-            let off = |n: usize| {
-                (0..MAX_AXES).any(|axis| (start[n][axis] - end[n][axis]).abs() > self.rounding[n])
-            };
-            off(0) || off(1)
-        })
+        counted && steps
     }
-}
-
-fn derivatives(segment: &Segment, t_s: f64) -> [AxisVector; 2] {
-    [segment.velocity(t_s), segment.acceleration(t_s)]
-}
-
-/// The same at the start, where they are coefficients.
-fn derivatives_at_start(segment: &Segment) -> [AxisVector; 2] {
-    let of = |f: fn(&[f64; 6]) -> f64| {
-        AxisVector(std::array::from_fn(|axis| f(&segment.coefficients[axis])))
-    };
-    [of(|c| c[1]), of(|c| 2.0 * c[2])]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use tandem_sdk::AxisVector;
 
     fn segment(coefficients: [f64; 6]) -> Segment {
         let mut segment = Segment::rest(&AxisVector::ZERO, 0.5);
@@ -70,9 +67,15 @@ mod tests {
         segment
     }
 
+    /// Velocity and acceleration at its end.
+    fn at_end(segment: &Segment) -> [f64; 2] {
+        let end_s = segment.duration_s;
+        [segment.velocity(end_s)[1], segment.acceleration(end_s)[1]]
+    }
+
     #[test]
     fn steps_are_found_where_segments_meet() {
-        let mut junction_steps = JunctionSteps::new(ROUNDING);
+        let mut junction_steps = JunctionSteps::new(2, ROUNDING);
         // At its end the velocity is 4, the acceleration 8.
         assert!(
             !junction_steps.is_step_at(&segment([0.0, 0.0, 4.0, 0.0, 0.0, 0.0])),
@@ -82,16 +85,12 @@ mod tests {
             !junction_steps.is_step_at(&segment([1.0, 4.0, 4.0, -1.0, 0.0, 0.0])),
             "it goes on"
         );
-        let end = derivatives(&segment([1.0, 4.0, 4.0, -1.0, 0.0, 0.0]), 0.5).map(|v| v[1]);
+        let end = at_end(&segment([1.0, 4.0, 4.0, -1.0, 0.0, 0.0]));
         assert!(
             junction_steps.is_step_at(&segment([0.0, end[0], end[1] / 2.0 + 0.2, 0.0, 0.0, 0.0])),
             "acceleration steps"
         );
-        let end = derivatives(
-            &segment([0.0, end[0], end[1] / 2.0 + 0.2, 0.0, 0.0, 0.0]),
-            0.5,
-        )
-        .map(|v| v[1]);
+        let end = at_end(&segment([0.0, end[0], end[1] / 2.0 + 0.2, 0.0, 0.0, 0.0]));
         assert!(
             junction_steps.is_step_at(&segment([0.0, end[0] + 1e-3, end[1] / 2.0, 0.0, 0.0, 0.0])),
             "velocity steps"
@@ -103,7 +102,7 @@ mod tests {
         );
         // What is rounding on fast machines is a part of what a slow one may.
         for (rounding, counts) in [(ROUNDING, false), ([1e-6, 3e-4], true)] {
-            let mut junction_steps = JunctionSteps::new(rounding);
+            let mut junction_steps = JunctionSteps::new(2, rounding);
             assert!(!junction_steps.is_step_at(&segment([0.0, 0.0, 4.0, 0.0, 0.0, 0.0])));
             assert_eq!(
                 junction_steps.is_step_at(&segment([1.0, 4.0 + 5e-5, 4.0, 0.0, 0.0, 0.0])),

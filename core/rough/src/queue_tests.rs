@@ -1,7 +1,7 @@
 //! What the ring is given, and what the fine loop is told with it.
 
 use tandem_rings::{FineEnd, RestCause, Sizes, bridge};
-use tandem_sdk::{AxisVector, Curve};
+use tandem_sdk::{AxisVector, Curve, MAX_AXES};
 
 use super::*;
 use crate::doubles::{block_of, report, rest};
@@ -13,7 +13,10 @@ const PERIOD_S: f64 = 0.01;
 fn queue() -> (Queue, FineEnd) {
     let (rough, fine, _host) = bridge(Sizes::default());
     let depth = QueueDepth::new(PERIOD_S, 0.001, 1.0, Easing::NONE);
-    (Queue::new(rough, depth, JunctionSteps::new(ROUNDING)), fine)
+    (
+        Queue::new(rough, depth, JunctionSteps::new(MAX_AXES, ROUNDING)),
+        fine,
+    )
 }
 
 /// A segment of a block at 50 mm/s along the first axis that leaves 100 mm/s², with a jerk limit.

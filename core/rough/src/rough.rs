@@ -2,7 +2,7 @@
 
 use tandem_gcode::{Input, InputMode, InputWait, Item};
 use tandem_rings::RoughEnd;
-use tandem_sdk::{Accepted, AxisLimits, Edge, Event, EventKind, NurbsData, Planner};
+use tandem_sdk::{Accepted, AxisLimits, Edge, Event, EventKind, MAX_AXES, NurbsData, Planner};
 
 use crate::Observer;
 use crate::depth::{QueueDepth, SERVED_FOR_PERIODS};
@@ -31,6 +31,8 @@ pub struct RoughConfig {
     /// Share of the worst stop that the queue holds: 1, or the machine cannot use the speed that is planned. Tests show
     /// with less what the depth is for.
     pub depth_factor: f64,
+    /// Axes and joints that are planned: the first ones of a segment.
+    pub lanes: usize,
     /// Steps between segments up to these count as none: of velocity, mm/s, and of acceleration, mm/s².
     pub seam_rounding: [f64; 2],
     /// How slowly the linear axes change their speed: how long a sender's lines are gathered follows from it.
@@ -48,6 +50,7 @@ impl RoughConfig {
             advance_s: rough_period_s,
             awaits_drives: false,
             depth_factor: 1.0,
+            lanes: MAX_AXES,
             seam_rounding: ROUNDING,
             slowness: Slowness::NONE,
             easing: Easing::NONE,
@@ -177,7 +180,7 @@ impl RoughLoop {
                     config.depth_factor,
                     config.easing,
                 ),
-                JunctionSteps::new(config.seam_rounding),
+                JunctionSteps::new(config.lanes, config.seam_rounding),
             ),
             items: Vec::new(),
             next: 0,

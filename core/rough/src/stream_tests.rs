@@ -569,7 +569,7 @@ fn what_a_planner_must_not_emit_is_named() {
         (
             |sink| {
                 sink.segment(&Segment::rest(
-                    &AxisVector([f64::INFINITY; tandem_sdk::MAX_AXES]),
+                    &AxisVector([f64::INFINITY; MAX_AXES]),
                     1.0,
                 ));
             },

@@ -108,6 +108,7 @@ impl JobParts {
         let mut rough_config = RoughConfig::new(machine.rough_period_s, machine.fine_period_s);
         rough_config.advance_s = parts::advance_s(machine.rough_period_s, depth_s, segments);
         rough_config.awaits_drives = true;
+        rough_config.lanes = config.lane_count();
         for (axis, limits) in config.limits.axes().iter().enumerate() {
             rough_config.easing.count(axis, limits.jerk_mm_per_s3);
             rough_config.count_steps_of(limits.acceleration_mm_per_s2, limits.jerk_mm_per_s3);
