@@ -329,7 +329,7 @@ fn the_first_period_behind_a_motion_is_told_and_stays() {
         let moves = |sample: &&Sample| {
             sample.end_feed_mm_per_s != 0.0 || sample.state == MachineState::Stopping
         };
-        let last = samples.iter().filter(moves).next_back().unwrap();
+        let last = samples.iter().rfind(moves).unwrap();
         assert_eq!(
             status.rests_from_tick.load(Relaxed),
             last.tick + 1,
