@@ -251,8 +251,8 @@ impl SimulatedDrives {
 
     /// Writes every field of the joints and every input; latches of the period before are over.
     fn report(&mut self, feedback: &mut Feedback) {
+        self.tell(feedback);
         for joint in 0..self.joint_count {
-            self.tell(joint, feedback);
             feedback.current_a[joint] = self.mechanics.current_a(joint);
         }
         feedback.analog = self.mechanics.analog();
@@ -262,23 +262,25 @@ impl SimulatedDrives {
         feedback.spindle_at_speed = u32::from(self.spindle.is_at_speed());
     }
 
-    /// What is heard of a joint; of one that is lost, what was heard last.
-    fn tell(&mut self, joint: usize, feedback: &mut Feedback) {
-        let power = &self.powers[joint];
-        if power.is_lost() {
-            self.silent_periods[joint] = self.silent_periods[joint].saturating_add(1);
-        } else {
-            let seen = self.mechanics.seen(joint);
-            self.told[joint] = Motion {
-                position: self.encoders.read(seen.position),
-                speed: seen.speed,
-            };
-            self.silent_periods[joint] = 0;
+    /// What is heard of each joint; of one that is lost, what was heard last.
+    fn tell(&mut self, feedback: &mut Feedback) {
+        for (joint, power) in self.powers[..self.joint_count].iter().enumerate() {
+            if power.is_lost() {
+                self.silent_periods[joint] = self.silent_periods[joint].saturating_add(1);
+            } else {
+                let seen = self.mechanics.seen(joint);
+                self.told[joint] = Motion {
+                    position: self.encoders.read(seen.position),
+                    speed: seen.speed,
+                };
+                self.silent_periods[joint] = 0;
+            }
+            feedback.position[joint] = self.told[joint].position;
+            feedback.speed[joint] = self.told[joint].speed;
+            feedback.state[joint] = power.state();
+            feedback.fault_code[joint] = power.code();
+            feedback.age_periods[joint] = self.silent_periods[joint];
         }
-        (feedback.position[joint], feedback.speed[joint]) =
-            (self.told[joint].position, self.told[joint].speed);
-        (feedback.state[joint], feedback.fault_code[joint]) = (power.state(), power.code());
-        feedback.age_periods[joint] = self.silent_periods[joint];
     }
 
     /// The inputs after a period, and the positions caught in it, as the drives see them.
@@ -385,7 +387,7 @@ impl Driver for SimulatedDrives {
         std::thread::sleep(self.bus_start);
         self.begin();
         let mut first = Feedback::default();
-        (0..self.joint_count).for_each(|joint| self.tell(joint, &mut first));
+        self.tell(&mut first);
         self.switch(&mut first);
         self.wire = Wire::new(&self.options, &first, self.period_s);
         self.life = Life::Running;
