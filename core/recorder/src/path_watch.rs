@@ -119,7 +119,13 @@ impl PathWatch {
     /// not looked at for nothing.
     pub fn sample(&mut self, block: u64, position: &AxisVector, each: bool) -> f64 {
         self.find(block);
-        let last = std::mem::replace(&mut self.position, *position);
+        let distance_mm = self.distance_mm(position, each);
+        self.position = *position;
+        distance_mm
+    }
+
+    /// The same, behind `self.position`, where the block has been found.
+    fn distance_mm(&mut self, position: &AxisVector, each: bool) -> f64 {
         if !each
             && !self.has_curves
             && let Some(own) = self.entries.get_mut(self.here)
@@ -129,7 +135,7 @@ impl PathWatch {
                 return own_mm;
             }
         }
-        let moved_mm = (*position - last)
+        let moved_mm = (*position - self.position)
             .0
             .iter()
             .map(|d| d * d)

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use tandem_machine::Machine;
 use tandem_rings::{Sample, Switched};
-use tandem_sdk::Axes;
+use tandem_sdk::{Axes, MAX_AXES};
 
 use super::output::{Output, RecordError};
 
@@ -165,6 +165,10 @@ pub fn outputs_word(switched: &Switched) -> String {
 
 /// How old the oldest feedback of an axis was, periods.
 pub fn age(sample: &Sample) -> u32 {
+    // What is true nearly always is looked at first.
+    if sample.age_periods == [0; MAX_AXES] {
+        return 0;
+    }
     sample.age_periods.iter().copied().max().unwrap_or(0)
 }
 
