@@ -66,6 +66,8 @@ pub struct QueueDepth {
     braking: Braking,
     /// Negative rates at which entries come no denser than the fine loop looks at them.
     dense: SlidingMax,
+    /// Where the fine loop was last, s of program time.
+    passed_s: f64,
     /// Where the last entries end, s of program time, and the place of the next one among them.
     ends_s: Box<[f64]>,
     next_end: usize,
@@ -147,6 +149,7 @@ impl QueueDepth {
             easing,
             braking: Braking::default(),
             dense: SlidingMax::default(),
+            passed_s: f64::NEG_INFINITY,
             ends_s: vec![f64::NEG_INFINITY; max_entries_a_period(fine_period_s)].into_boxed_slice(),
             next_end: 0,
             rough_period_s,
@@ -208,6 +211,11 @@ impl QueueDepth {
 
     /// The fine loop has come to `now_s`.
     pub fn passed(&mut self, now_s: f64) {
+        // It is asked several times in a rough period, and what has come meanwhile ends later.
+        if now_s == self.passed_s {
+            return;
+        }
+        self.passed_s = now_s;
         self.decelerations.forget(now_s);
         self.stops.forget(now_s);
         self.ramps.forget(now_s);

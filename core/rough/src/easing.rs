@@ -69,8 +69,12 @@ impl Easing {
 /// `whole` of the rate's second derivative, 1/s², and the plan leaves `left` of it. What the plan itself brakes with along the path need
 /// not be left.
 fn begins_s(segment: &Segment, t_s: f64, left: f64, whole: f64) -> f64 {
+    // Nothing of the limits is used against the motion, or nothing moves.
+    if left >= whole {
+        return 0.0;
+    }
     let [speed, _, path_jerk] = derivatives(&segment.path, t_s);
-    if whole.is_infinite() || speed <= 0.0 {
+    if speed <= 0.0 {
         return 0.0;
     }
     let brakes = (-path_jerk / speed).max(0.0);

@@ -568,10 +568,7 @@ fn what_a_planner_must_not_emit_is_named() {
         ),
         (
             |sink| {
-                sink.segment(&Segment::rest(
-                    &AxisVector([f64::INFINITY; MAX_AXES]),
-                    1.0,
-                ));
+                sink.segment(&Segment::rest(&AxisVector([f64::INFINITY; MAX_AXES]), 1.0));
             },
             Some("not finite"),
         ),
