@@ -2,6 +2,8 @@
 //! `open` what is not yet.
 
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::thread;
 use std::time::Duration;
 
 use tandem_campaign::case::Case;
@@ -22,17 +24,30 @@ fn cases(of: &str) -> Vec<PathBuf> {
     folders
 }
 
+/// Drives every case, as many at a time as there are processors.
 fn assert_clean(of: &str) {
-    let binary = Path::new(env!("CARGO_BIN_EXE_tandem-campaign"));
-    let work = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("cases-{of}"));
-    let mut worker = Worker::new(binary, &work, Duration::from_mins(2));
-    let mut failed = vec![];
-    for folder in cases(of) {
-        let report = worker.run(&Case::read(&folder).unwrap());
-        if report.is_failure() {
-            failed.push(format!("{}: {report:?}", folder.display()));
+    let cases = Mutex::new(cases(of).into_iter());
+    let next = || cases.lock().unwrap().next();
+    let failed = Mutex::new(vec![]);
+    let drive_all = |thread: usize| {
+        let binary = Path::new(env!("CARGO_BIN_EXE_tandem-campaign"));
+        let work = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("cases-{of}-{thread}"));
+        let mut worker = Worker::new(binary, &work, Duration::from_mins(2));
+        while let Some(folder) = next() {
+            let report = worker.run(&Case::read(&folder).unwrap());
+            if report.is_failure() {
+                let words = format!("{}: {report:?}", folder.display());
+                failed.lock().unwrap().push(words);
+            }
         }
-    }
+    };
+    thread::scope(|scope| {
+        for number in 0..thread::available_parallelism().map_or(1, usize::from) {
+            let drive_all = &drive_all;
+            scope.spawn(move || drive_all(number));
+        }
+    });
+    let failed = failed.into_inner().unwrap();
     assert!(failed.is_empty(), "{}", failed.join("\n"));
 }
 

@@ -3,8 +3,10 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
+use std::sync::Mutex;
+use std::thread;
 
-use tandem_readers::{Damage, readers};
+use tandem_readers::{Damage, Reader, readers};
 use tandem_rig::Random;
 
 /// Inputs of each reader: some seconds of one processor in a build without optimisation.
@@ -15,15 +17,31 @@ fn whatever_is_damaged_is_read_or_refused() {
     let asked = std::env::var("TANDEM_SEEDS");
     let inputs = asked.map_or(INPUTS, |count| count.parse().expect("a number"));
     let mut random = Random::from_the_clock();
-    for reader in readers() {
-        let mut damage = Damage::new(&reader, random.below(1 << 31));
-        for index in 0..inputs {
-            let input = damage.input();
-            if catch_unwind(AssertUnwindSafe(|| (reader.judge)(&input))).is_err() {
-                let kept = Path::new(env!("CARGO_TARGET_TMPDIR")).join(reader.name);
-                std::fs::write(&kept, &input).expect("a file");
-                panic!("{}: input {index}, see {}", reader.name, kept.display());
-            }
+    // Each with a seed of its own, so that they are damaged alike however many are judged at a time.
+    let seeded = readers().into_iter().map(|reader| {
+        let damage = Damage::new(&reader, random.below(1 << 31));
+        (reader, damage)
+    });
+    let seeded = Mutex::new(seeded.collect::<Vec<_>>());
+    let next = || seeded.lock().unwrap().pop();
+    thread::scope(|scope| {
+        for _ in 0..thread::available_parallelism().map_or(1, usize::from) {
+            scope.spawn(|| {
+                while let Some((reader, damage)) = next() {
+                    judge_all(&reader, damage, inputs);
+                }
+            });
+        }
+    });
+}
+
+fn judge_all(reader: &Reader, mut damage: Damage, inputs: usize) {
+    for index in 0..inputs {
+        let input = damage.input();
+        if catch_unwind(AssertUnwindSafe(|| (reader.judge)(&input))).is_err() {
+            let kept = Path::new(env!("CARGO_TARGET_TMPDIR")).join(reader.name);
+            std::fs::write(&kept, &input).expect("a file");
+            panic!("{}: input {index}, see {}", reader.name, kept.display());
         }
     }
 }

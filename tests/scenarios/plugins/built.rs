@@ -1,9 +1,12 @@
 //! Shared libraries for the tests. Cargo builds them from what the workspace has fetched: no network is needed.
 
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{Mutex, OnceLock};
+
+use toml::{Table, Value};
 
 use crate::harness::{mill, root};
 
@@ -69,23 +72,82 @@ pub fn third_party(name: &str) -> PathBuf {
     folder.join(file(name))
 }
 
-/// A built-in plugin as a shared library: its crate says nothing of one, and has no feature for it. Alone it takes other features of
-/// what it depends on than the workspace does, those of plugins outside: so it is built beside them.
+/// A built-in plugin as a shared library: its crate says nothing of one, and has no feature for it. So packages that do say it stand
+/// around the same sources, all in one workspace: what they depend on is built once, and they are built beside each other.
 pub fn built_in(package: &str) -> PathBuf {
-    let mut command = cargo();
-    command
-        .current_dir(root())
-        .args(["rustc", "--offline", "--locked", "--lib"]);
-    run(command.args(["--crate-type", "cdylib", "-p", package]));
-    third_party_target().join("debug").join(file(package))
+    static FOLDER: OnceLock<PathBuf> = OnceLock::new();
+    let folder = FOLDER.get_or_init(|| {
+        let manifest = write_workspace(&third_party_target().join("built-in"));
+        run(cargo()
+            .args(["build", "--workspace", "--offline", "--manifest-path"])
+            .arg(manifest));
+        third_party_target().join("debug")
+    });
+    folder.join(file(package))
+}
+
+/// Writes the workspace of all built-in plugins as shared libraries into `folder`; gives its manifest.
+fn write_workspace(folder: &Path) -> PathBuf {
+    let plugins = fs::read_dir(root().join("plugins")).unwrap();
+    let plugins = plugins.map(|entry| entry.unwrap().path());
+    let plugins = plugins.chain([root().join("hal-drivers/sim")]);
+    let members = plugins
+        .map(|plugin| write_member(folder, &plugin))
+        .collect();
+    let mut workspace = read(&root().join("Cargo.toml"));
+    workspace.remove("profile");
+    let dependencies = table(table(&mut workspace, "workspace"), "dependencies");
+    lead_to(&root(), dependencies);
+    lead_to(&root(), table(table(&mut workspace, "patch"), "crates-io"));
+    let workspace_table = table(&mut workspace, "workspace");
+    workspace_table.insert("members".into(), Value::Array(members));
+    workspace_table.remove("exclude");
+    fs::copy(root().join("Cargo.lock"), folder.join("Cargo.lock")).unwrap();
+    let manifest = folder.join("Cargo.toml");
+    fs::write(&manifest, workspace.to_string()).unwrap();
+    manifest
+}
+
+/// Writes a package that makes a shared library of the sources in `plugin`; gives the name of its folder.
+fn write_member(folder: &Path, plugin: &Path) -> Value {
+    let mut package = read(&plugin.join("Cargo.toml"));
+    for part in ["dev-dependencies", "bench"] {
+        package.remove(part);
+    }
+    let source = plugin.join("src/lib.rs");
+    let library = [
+        ("path", source.to_str().unwrap().into()),
+        ("crate-type", Value::Array(vec!["cdylib".into()])),
+    ];
+    let library = library.map(|(key, value)| (key.to_string(), value));
+    package.insert("lib".into(), Value::Table(library.into_iter().collect()));
+    let name = plugin.file_name().unwrap().to_str().unwrap();
+    let member = folder.join(name);
+    fs::create_dir_all(&member).unwrap();
+    fs::write(member.join("Cargo.toml"), package.to_string()).unwrap();
+    name.into()
+}
+
+fn read(manifest: &Path) -> Table {
+    fs::read_to_string(manifest).unwrap().parse().unwrap()
+}
+
+fn table<'a>(manifest: &'a mut Table, key: &str) -> &'a mut Table {
+    manifest[key].as_table_mut().unwrap()
+}
+
+/// Makes the paths of `dependencies`, which are told from `root`, lead there from anywhere.
+fn lead_to(root: &Path, dependencies: &mut Table) {
+    for (_, dependency) in dependencies.iter_mut() {
+        if let Some(path) = dependency.get_mut("path") {
+            *path = root.join(path.as_str().unwrap()).to_str().unwrap().into();
+        }
+    }
 }
 
 /// The mill's file without the table `section` and those below it.
 pub fn mill_without(section: &str) -> String {
-    let (text, table) = (
-        std::fs::read_to_string(mill()).unwrap(),
-        format!("[{section}"),
-    );
+    let (text, table) = (fs::read_to_string(mill()).unwrap(), format!("[{section}"));
     let mut inside = false;
     let kept = text.lines().filter(|line| {
         inside = if line.starts_with('[') {
