@@ -174,6 +174,7 @@ impl<const L: usize> Checker<L> {
 
     /// Whether the motion follows the path from its start to its end, at samples of any phase: those of this one have places in their
     /// order, and so have they with the places between them at which it turns.
+    #[inline(always)]
     fn is_in_order(
         &mut self,
         run: &Run<'_, L>,
