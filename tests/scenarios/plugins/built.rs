@@ -1,7 +1,7 @@
 //! Shared libraries for the tests. Cargo builds them from what the workspace has fetched: no network is needed.
 
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
-use std::fs;
+use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{Mutex, OnceLock};
@@ -77,7 +77,12 @@ pub fn third_party(name: &str) -> PathBuf {
 pub fn built_in(package: &str) -> PathBuf {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
     let folder = FOLDER.get_or_init(|| {
-        let manifest = write_workspace(&third_party_target().join("built-in"));
+        let workspace = third_party_target().join("built-in");
+        fs::create_dir_all(&workspace).unwrap();
+        // Where every test is a process, one of them writes while the others wait.
+        let lock = File::create(workspace.join("lock")).unwrap();
+        lock.lock().unwrap();
+        let manifest = write_workspace(&workspace);
         run(cargo()
             .args(["build", "--workspace", "--offline", "--manifest-path"])
             .arg(manifest));
