@@ -195,15 +195,15 @@ export async function tabs() {
       }
       const tickNow = async (client) => (await client.ask("status")).tick;
       for (const client of clients) await client.ask("start");
+      // All at the same time: one after the other each waits for a page that is busy drawing.
       const look = async () => {
-        const heaps = [];
-        for (const page of pages) {
+        const heaps = await Promise.all(pages.map(async (page) => {
           const session = await page.context().newCDPSession(page);
           await session.send("HeapProfiler.collectGarbage");
           const { usedSize } = await session.send("Runtime.getHeapUsage");
-          heaps.push(usedSize / 1e6);
           await session.detach();
-        }
+          return usedSize / 1e6;
+        }));
         const resident = Number(readFileSync(`/proc/${controller.child.pid}/status`, "utf8").match(/VmRSS:\s+(\d+)/)[1]) / 1e3;
         return { heaps, resident };
       };
