@@ -78,7 +78,7 @@ impl Cursor {
         self.start_s + self.local_s
     }
 
-    /// Planned position here of the first `lanes` axes; the others are none.
+    /// Planned position here of the first `lanes` axes; the others are 0.
     #[inline]
     pub fn position(&self, lanes: usize) -> AxisVector {
         let mut position = AxisVector::ZERO;

@@ -99,18 +99,17 @@ fn write_workspace(folder: &Path) -> PathBuf {
     let members = plugins
         .map(|plugin| write_member(folder, &plugin))
         .collect();
-    let mut workspace = read(&root().join("Cargo.toml"));
-    workspace.remove("profile");
-    let dependencies = table(table(&mut workspace, "workspace"), "dependencies");
-    lead_to(&root(), dependencies);
-    lead_to(&root(), table(table(&mut workspace, "patch"), "crates-io"));
-    let workspace_table = table(&mut workspace, "workspace");
-    workspace_table.insert("members".into(), Value::Array(members));
-    workspace_table.remove("exclude");
+    let mut manifest = read(&root().join("Cargo.toml"));
+    manifest.remove("profile");
+    lead_to(&root(), table(table(&mut manifest, "patch"), "crates-io"));
+    let workspace = table(&mut manifest, "workspace");
+    lead_to(&root(), table(workspace, "dependencies"));
+    workspace.insert("members".into(), Value::Array(members));
+    workspace.remove("exclude");
     fs::copy(root().join("Cargo.lock"), folder.join("Cargo.lock")).unwrap();
-    let manifest = folder.join("Cargo.toml");
-    fs::write(&manifest, workspace.to_string()).unwrap();
-    manifest
+    let path = folder.join("Cargo.toml");
+    fs::write(&path, manifest.to_string()).unwrap();
+    path
 }
 
 /// Writes a package that makes a shared library of the sources in `plugin`; gives the name of its folder.

@@ -311,7 +311,6 @@ fn a_sample_says_how_fast_the_path_was_driven_in_its_period_and_at_its_end() {
     assert!((fastest.fold(0.0, f64::max) - 20.0).abs() < 1e-9);
 }
 
-/// Drives that count the beats of their bus notice no change of jobs.
 /// Samples come to the host later than the word that nothing moves: who reads both can tell which samples are older than the rest.
 #[test]
 fn the_first_period_behind_a_motion_is_told_and_stays() {
@@ -342,6 +341,7 @@ fn the_first_period_behind_a_motion_is_told_and_stays() {
     }
 }
 
+/// Drives that count the beats of their bus notice no change of jobs.
 #[test]
 fn the_number_of_the_exchange_goes_on_from_one_job_to_the_next() {
     let job = || demanding::Bench::new(&demanding::config(1), Script::new(1));

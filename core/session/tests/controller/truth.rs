@@ -458,6 +458,8 @@ fn a_machine_that_is_said_to_rest_stays_where_it_is_shown() {
             let held = held.filter(|told| told["state"] == "held");
             let words: Vec<_> = held.map(|told| told["at_rest"] == true).collect();
             let expected: &[bool] = if stop == "hold" { &[false, true] } else { &[] };
+            // A motion that has hardly begun may rest before anybody is told that it slows down.
+            assert_eq!(words.last(), expected.last(), "{stop}");
             assert!(soon || words == expected, "{stop}: {words:?}");
         }
     }
