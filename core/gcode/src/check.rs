@@ -89,7 +89,7 @@ pub fn check(
     let mut pass = FirstPass::new(program, config, per_block);
     match pass.run(program) {
         Ok(()) => {}
-        Err(ProgramError::Text(diagnostic)) => pass.report.add(diagnostic),
+        Err(ProgramError::Text(diagnostic)) => pass.report.add(*diagnostic),
         Err(other) => return Err(other),
     }
     pass.report
@@ -125,12 +125,12 @@ impl<'a> FirstPass<'a> {
                 Step::Line => self.line(program, None),
                 Step::Wrong(diagnostic) => self.line(program, Some(diagnostic)),
                 Step::Stuck(diagnostic) => {
-                    self.report.add(diagnostic);
+                    self.report.add(*diagnostic);
                     return Ok(());
                 }
                 Step::Open(warning) => {
                     self.report.seen_to = Some(warning.line);
-                    self.report.warnings.push(warning);
+                    self.report.warnings.push(*warning);
                     return Ok(());
                 }
                 Step::End => break,
@@ -176,7 +176,7 @@ impl<'a> FirstPass<'a> {
                         LineError::new(Span::new(at, text.len()), "behind-percent", message);
                     Diagnostic::new(&program.name, number, text, error)
                 }
-                Ok(Next::Bad(diagnostic)) | Err(ProgramError::Text(diagnostic)) => diagnostic,
+                Ok(Next::Bad(diagnostic)) | Err(ProgramError::Text(diagnostic)) => *diagnostic,
                 Err(other) => return Err(other),
             };
             if opened {
@@ -192,7 +192,7 @@ impl<'a> FirstPass<'a> {
     }
 
     /// A line has been executed, or could not be.
-    fn line(&mut self, program: &Program, wrong: Option<Diagnostic>) {
+    fn line(&mut self, program: &Program, wrong: Option<Box<Diagnostic>>) {
         let interpreter = &mut self.execution.interpreter;
         let open = interpreter.is_assumed();
         if self.items.iter().any(Item::is_probe) {
@@ -202,7 +202,7 @@ impl<'a> FirstPass<'a> {
         if let Some(diagnostic) = wrong
             && !(open && OF_NUMBERS.contains(&diagnostic.code))
         {
-            self.report.add(diagnostic);
+            self.report.add(*diagnostic);
         }
         self.take_items(program);
     }

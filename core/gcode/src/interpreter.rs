@@ -545,9 +545,11 @@ impl Interpreter {
     /// The number of a program stands before all words, that of a subprogram alone in its line.
     #[inline]
     fn refuse_number(&mut self) -> Checked<()> {
-        let of_subprogram = self.state.subprograms.obeyed && self.words.is_number_of_program();
-        if self.words.has(b'O') && self.begun && !of_subprogram {
-            return Err(self.words.error(b'O', "o-word", O_WORDS));
+        if self.words.has(b'O') && self.begun {
+            let of_subprogram = self.state.subprograms.obeyed && self.words.is_number_of_program();
+            if !of_subprogram {
+                return Err(self.words.error(b'O', "o-word", O_WORDS));
+            }
         }
         self.begun |= !self.words.is_empty();
         Ok(())
@@ -600,6 +602,13 @@ impl Interpreter {
 
     #[inline]
     fn assign(&mut self) -> Checked<()> {
+        if self.words.assignments.is_empty() {
+            return Ok(());
+        }
+        self.assign_each()
+    }
+
+    fn assign_each(&mut self) -> Checked<()> {
         let assumed = self.reads_assumed.get();
         for assignment in &self.words.assignments {
             match &assignment.target {

@@ -182,19 +182,18 @@ impl Line<'_> {
         if !machine && (self.state.coordinates.is_rotated() || self.words.polar.is_some()) {
             return self.advance_in_plane(absolute);
         }
+        let base = match (machine, absolute) {
+            (true, _) => AxisVector::ZERO,
+            (_, true) => *self.state.coordinates.total(),
+            _ => self.state.path.position,
+        };
         let mut moved = 0;
-        for axis in 0..self.letters.count() {
-            let Some(value) = self.words.get(self.letters.letter(axis)) else {
-                continue;
-            };
-            let value = value * self.state.modes.word_scale(self.letters, axis);
-            let base = match (machine, absolute) {
-                (true, _) => 0.0,
-                (_, true) => self.state.coordinates.total()[axis],
-                _ => self.state.path.position[axis],
-            };
-            self.state.path.position[axis] = base + value;
-            moved |= 1 << axis;
+        for (axis, letter) in self.letters.each().iter().enumerate() {
+            if let Some(value) = self.words.get(*letter) {
+                let value = value * self.state.modes.word_scale(self.letters, axis);
+                self.state.path.position[axis] = base[axis] + value;
+                moved |= 1 << axis;
+            }
         }
         self.assume_target(moved, machine, absolute);
         self.state.path.moved = true;
@@ -352,6 +351,24 @@ impl Line<'_> {
         }
         self.state.path.advance_to(block.end);
         self.out.push(Item::Block(block, None));
+    }
+
+    /// Appends a block to `end`, otherwise a blank one but for what `fill` sets.
+    #[inline]
+    pub fn push_to(&mut self, end: AxisVector, fill: impl FnOnce(&mut Block)) {
+        let state = &*self.state;
+        let next = || {
+            let mut block = state.blank_block();
+            block.end = end;
+            fill(&mut block);
+            Item::Block(block, None)
+        };
+        if self.state.compensation.holds() {
+            return self.state.compensation.hold(next());
+        }
+        // What is made behind the place for it is made in its place: a block is large.
+        self.out.extend(std::iter::once_with(next));
+        self.state.path.advance_to(end);
     }
 
     /// Appends a block whose turn has come only now.

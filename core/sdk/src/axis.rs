@@ -177,6 +177,7 @@ impl Axes {
 
     /// The length of a displacement as path speed counts it: over the linear axes where any of them moves (mm), else
     /// over the rotary ones (rad).
+    #[inline]
     pub fn path_length(&self, displacement: &AxisVector) -> f64 {
         let sum = |rotary: bool| -> f64 {
             let squares = (0..self.count())

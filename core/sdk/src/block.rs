@@ -190,6 +190,7 @@ layout!(Block {
 
 impl Block {
     /// A dwell of zero duration at `position`: the blank from which readers and tests build blocks.
+    #[inline]
     pub fn at(position: AxisVector) -> Self {
         Self {
             kind: BlockKind::Dwell,

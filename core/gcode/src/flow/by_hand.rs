@@ -99,7 +99,7 @@ fn execute(
 ) -> Result<(), Diagnostic> {
     let file = Arc::clone(interpreter.file());
     let whole = |error: ProgramError| match error {
-        ProgramError::Text(diagnostic) => diagnostic,
+        ProgramError::Text(diagnostic) => *diagnostic,
         other => Diagnostic::whole_line(&file, 1, text, "o-word", other.to_string()),
     };
     let mut program = Program::spool(&file, text).map_err(whole)?;

@@ -28,18 +28,30 @@ const MAX_CALLS: usize = 100;
 /// Most callers that a message names.
 const MAX_CALLERS_SHOWN: usize = 5;
 
-/// What a step has met.
+/// What a step has met. One is made for each line, and hardly ever holds a diagnostic, which is large.
 pub(crate) enum Step {
     /// A line has been executed.
     Line,
     /// A line is wrong; what follows can be executed to find more errors.
-    Wrong(Diagnostic),
+    Wrong(Box<Diagnostic>),
     /// Nothing more can be executed.
-    Stuck(Diagnostic),
+    Stuck(Box<Diagnostic>),
     /// In the first pass: where the program goes on depends on what a probe or an input will answer.
-    Open(Diagnostic),
+    Open(Box<Diagnostic>),
     /// The file is over.
     End,
+}
+
+impl Step {
+    #[cold]
+    fn wrong(diagnostic: Diagnostic) -> Self {
+        Self::Wrong(Box::new(diagnostic))
+    }
+
+    #[cold]
+    fn stuck(diagnostic: Diagnostic) -> Self {
+        Self::Stuck(Box::new(diagnostic))
+    }
 }
 
 /// A call that has not returned.
@@ -157,13 +169,13 @@ impl Execution {
         self.is_kept = false;
         match self.sources.next(program)? {
             Next::Line(range) => self.last = range,
-            Next::Bad(diagnostic) => return Ok(Step::Wrong(self.called(diagnostic))),
+            Next::Bad(diagnostic) => return Ok(Step::wrong(self.called(*diagnostic))),
             Next::End => return Ok(Step::End),
         }
         if self.sources.current().outline.is_some() {
             self.steps += 1;
             if self.steps > self.interpreter.config().max_steps {
-                return Ok(Step::Stuck(self.endless()));
+                return Ok(Step::stuck(self.endless()));
             }
         }
         let source = self.sources.current();
@@ -180,7 +192,7 @@ impl Execution {
             return self.leap(program, jump, assumed, out);
         }
         Ok(done.map_or_else(
-            |diagnostic| Step::Wrong(self.called(diagnostic)),
+            |diagnostic| Step::wrong(self.called(diagnostic)),
             |()| Step::Line,
         ))
     }
@@ -199,7 +211,7 @@ impl Execution {
                 // The number of a program is a word as any other.
                 Ok(Title::Number(_)) => {
                     let done = self.interpreter.line(number, lines.text(&self.last), out);
-                    return Ok(done.map_or_else(Step::Wrong, |()| Step::Line));
+                    return Ok(done.map_or_else(Step::wrong, |()| Step::Line));
                 }
                 Ok(Title::Name) => {
                     let text = lines.text(&self.last).to_vec();
@@ -212,7 +224,7 @@ impl Execution {
                 .index(program, which, self.interpreter.config())?;
         }
         if let Some(wrong) = self.sources.outline().wrong(number) {
-            return Ok(Step::Stuck(self.called(wrong.clone())));
+            return Ok(Step::stuck(self.called(wrong.clone())));
         }
         self.keep_text();
         let text = std::mem::take(&mut self.text);
@@ -224,7 +236,7 @@ impl Execution {
         } else {
             let done = self.interpreter.line(number, &text, out);
             Ok(done.map_or_else(
-                |diagnostic| Step::Wrong(self.called(diagnostic)),
+                |diagnostic| Step::wrong(self.called(diagnostic)),
                 |()| Step::Line,
             ))
         };
@@ -241,7 +253,7 @@ impl Execution {
         }
         let error = o_word::without_keyword(Span::new(0, text.len()));
         let diagnostic = Diagnostic::new(self.interpreter.file(), number, text, error);
-        Step::Wrong(self.called(diagnostic))
+        Step::wrong(self.called(diagnostic))
     }
 
     /// M98 and M99, and M6 where a subroutine changes tools.
@@ -263,7 +275,7 @@ impl Execution {
                 let error = LineError::new(Span::new(0, self.text().len()), "endless", message);
                 let text = self.text();
                 let diagnostic = Diagnostic::new(self.interpreter.file(), number, text, error);
-                return Ok(Step::Stuck(diagnostic));
+                return Ok(Step::stuck(diagnostic));
             }
             Jump::Call { .. } if assumed && self.pass == Pass::First => {
                 let text = self.text.clone();
@@ -287,7 +299,7 @@ impl Execution {
             },
         };
         let diagnostic = Diagnostic::new(self.interpreter.file(), number, self.text(), error);
-        Ok(Step::Wrong(self.called(diagnostic)))
+        Ok(Step::wrong(self.called(diagnostic)))
     }
 
     fn call_program(
@@ -386,7 +398,7 @@ impl Execution {
         if !jumps && let Err(error) = self.read_values(&entry, text) {
             let diagnostic = Diagnostic::new(self.interpreter.file(), entry.number, text, error);
             self.leave_block(program, &entry)?;
-            return Ok(Step::Wrong(self.called(diagnostic)));
+            return Ok(Step::wrong(self.called(diagnostic)));
         }
         let decides = !matches!(
             entry.word.keyword,
@@ -451,10 +463,10 @@ impl Execution {
         let span = Span::new(0, text.len());
         let error = LineError::new(span, "branch-open", message);
         let diagnostic = Diagnostic::new(self.interpreter.file(), number, text, error);
-        Step::Open(Diagnostic {
+        Step::Open(Box::new(Diagnostic {
             severity: Severity::Warning,
             ..self.called(diagnostic)
-        })
+        }))
     }
 
     /// `if`, and the branches after it whose turn it is.
@@ -481,7 +493,7 @@ impl Execution {
         if let Err(error) = self.read_values(&next, &line) {
             let diagnostic = Diagnostic::new(self.interpreter.file(), next.number, &line, error);
             self.leave_block(program, &next)?;
-            return Ok(Step::Wrong(self.called(diagnostic)));
+            return Ok(Step::wrong(self.called(diagnostic)));
         }
         if self.assumes() {
             return Ok(self.open(next.number, &line));
@@ -583,7 +595,7 @@ impl Execution {
                     Err(error) => {
                         let diagnostic =
                             Diagnostic::new(self.interpreter.file(), entry.number, text, error);
-                        return Ok(Step::Wrong(self.called(diagnostic)));
+                        return Ok(Step::wrong(self.called(diagnostic)));
                     }
                 }
             }
@@ -602,7 +614,7 @@ impl Execution {
             ))
         };
         if self.frames.len() == MAX_CALLS {
-            return Ok(Step::Stuck(refuse(self, too_deep())));
+            return Ok(Step::stuck(refuse(self, too_deep())));
         }
         let (target, sub) =
             match self
@@ -610,7 +622,7 @@ impl Execution {
                 .find_sub(program, &label, self.interpreter.config())?
             {
                 Ok(found) => found,
-                Err(why) => return Ok(Step::Wrong(refuse(self, why))),
+                Err(why) => return Ok(Step::wrong(refuse(self, why))),
             };
         self.enter(program, (target, sub), entry.number, None)
     }
@@ -626,7 +638,7 @@ impl Execution {
         let called = self.sources.get(target).outline.as_ref();
         let wrong = called.and_then(|outline| outline.wrong(outline.entry(sub).number));
         if let Some(wrong) = wrong {
-            return Ok(Step::Stuck(self.called(wrong.clone())));
+            return Ok(Step::stuck(self.called(wrong.clone())));
         }
         self.frames.push(Frame {
             file: self.sources.current,
@@ -696,7 +708,7 @@ impl Execution {
                 why,
             );
             let diagnostic = Diagnostic::new(self.interpreter.file(), entry.number, text, error);
-            return Ok(Step::Stuck(diagnostic));
+            return Ok(Step::stuck(diagnostic));
         };
         self.interpreter
             .leave_sub(self.values.first().copied(), out);

@@ -46,7 +46,13 @@ pub enum ProgramError {
     WaitsForProbe(Arc<str>),
     /// An error in the text.
     #[error(transparent)]
-    Text(#[from] Diagnostic),
+    Text(#[from] Box<Diagnostic>),
+}
+
+impl From<Diagnostic> for ProgramError {
+    fn from(diagnostic: Diagnostic) -> Self {
+        Self::Text(Box::new(diagnostic))
+    }
 }
 
 /// A part program: a file kept open, so that both passes read the same one.

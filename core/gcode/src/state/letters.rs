@@ -63,6 +63,12 @@ impl Letters {
         self.count
     }
 
+    /// The letters of the axes in their order.
+    #[inline]
+    pub fn each(&self) -> &[u8] {
+        &self.names[..self.count]
+    }
+
     #[inline]
     pub fn letter(&self, axis: usize) -> u8 {
         self.names[axis]

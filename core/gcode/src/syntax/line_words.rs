@@ -14,7 +14,7 @@ pub(crate) struct Code {
 }
 
 /// The G or the M words of a line in their order.
-#[derive(Clone, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Codes {
     codes: [Code; MAX_CODES],
     count: usize,
@@ -22,16 +22,22 @@ pub(crate) struct Codes {
 
 impl Codes {
     pub fn push(&mut self, code: Code) -> Checked<()> {
-        if self.count == MAX_CODES {
-            return Err(LineError::new(
-                code.span,
-                "too-many",
-                format!("a line holds at most {MAX_CODES} G and M words each"),
-            ));
+        if self.take(code) {
+            return Ok(());
         }
-        self.codes[self.count] = code;
-        self.count += 1;
-        Ok(())
+        Err(LineError::new(
+            code.span,
+            "too-many",
+            format!("a line holds at most {MAX_CODES} G and M words each"),
+        ))
+    }
+
+    /// Adds a word; false where there is no place for it.
+    #[inline]
+    pub fn take(&mut self, code: Code) -> bool {
+        let place = self.codes.get_mut(self.count);
+        self.count += usize::from(place.is_some());
+        place.map(|place| *place = code).is_some()
     }
 
     pub fn as_slice(&self) -> &[Code] {
@@ -81,7 +87,7 @@ impl Polar {
 }
 
 /// The words of one line. Kept from line to line so that nothing is allocated.
-#[derive(Clone, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct LineWords {
     /// Bit per letter that the line has, G and M apart, and `SPINDLE_BIT`.
     pub present: u32,
@@ -172,14 +178,19 @@ impl LineWords {
     /// Adds a word other than G and M.
     #[inline]
     pub fn add(&mut self, letter: u8, value: f64, span: Span) -> Checked<()> {
-        let bit = 1 << index(letter);
-        if self.present & bit != 0 {
+        if self.has(letter) {
             return Err(twice(letter, span));
         }
-        self.present |= bit;
+        self.set(letter, value, span);
+        Ok(())
+    }
+
+    /// Sets a word other than G and M.
+    #[inline]
+    pub fn set(&mut self, letter: u8, value: f64, span: Span) {
+        self.present |= 1 << index(letter);
         self.values[index(letter)] = value;
         self.spans[index(letter)] = span;
-        Ok(())
     }
 
     #[inline]

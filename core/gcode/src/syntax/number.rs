@@ -1,6 +1,6 @@
 //! Decimal numbers: a sign, digits, a point, digits. There are no exponents in part programs.
 
-use super::scan::Scanner;
+use super::scan::{Scanner, byte_at, eight_at};
 use crate::line_error::{Checked, LineError};
 
 /// Most characters of a number.
@@ -25,39 +25,73 @@ pub(crate) fn starts_here(scanner: &Scanner) -> bool {
 ///
 /// # Errors
 /// No digit, a second point, or more than 64 characters.
-#[inline]
 pub(crate) fn read(scanner: &mut Scanner) -> Checked<f64> {
-    short(scanner).map_or_else(|| read_any(scanner), Ok)
+    let start = scanner.at();
+    let Some((value, end)) = short(scanner.text(), start) else {
+        return read_any(scanner);
+    };
+    scanner.advance(end - start);
+    Ok(value)
 }
 
-/// The number at the cursor, where it is short and right.
-#[inline]
-fn short(scanner: &mut Scanner) -> Option<f64> {
-    let start = scanner.at();
-    let sign = scanner.peek();
+/// The number that begins with byte `start` of `text`, and where it ends, where it is short and right.
+#[inline(always)]
+#[allow(
+    clippy::inline_always,
+    reason = "read for nearly every word, it takes longer to hand it over than to read it"
+)]
+pub(crate) fn short(text: &[u8], start: usize) -> Option<(f64, usize)> {
+    let sign = byte_at(text, start);
     let digit = sign.wrapping_sub(b'0');
-    if digit < 10 && !matches!(scanner.byte_at(start + 1), b'0'..=b'9' | b'.') {
-        scanner.advance(1);
-        return Some(f64::from(digit));
+    if digit < 10 && !matches!(byte_at(text, start + 1), b'0'..=b'9' | b'.') {
+        return Some((f64::from(digit), start + 1));
     }
     let from = start + usize::from(matches!(sign, b'+' | b'-'));
-    let (mut mantissa, whole) = few_digits(scanner.eight_at(from));
-    let mut end = from + whole;
-    let mut fraction = 0;
-    if scanner.byte_at(end) == b'.' {
-        let (below_one, count) = few_digits(scanner.eight_at(end + 1));
-        mantissa = mantissa * POWERS_OF_TEN_WHOLE[count] + below_one;
-        fraction = count;
-        end += 1 + count;
+    let eight = eight_at(text, from);
+    let whole = count_digits(eight);
+    if whole == EIGHT || (eight >> (8 * whole)) as u8 != b'.' {
+        // Eight digits may go on, and where there is none something is wrong.
+        return (whole != 0 && whole != EIGHT)
+            .then(|| (signed(sign, value_of(eight, whole), 0), from + whole));
     }
-    // Runs of eight digits may go on, and the rest is wrong.
-    if whole == EIGHT || fraction == EIGHT || whole + fraction == 0 || scanner.byte_at(end) == b'.'
-    {
+    // The point is taken out, and all digits are read at once.
+    let before = (1 << (8 * whole)) - 1;
+    let last = u64::from(byte_at(text, from + EIGHT)) << 56;
+    let digits = eight & before | eight >> 8 & !before | last;
+    let count = count_digits(digits);
+    let end = from + count + 1;
+    if count == EIGHT && byte_at(text, end).is_ascii_digit() {
+        return of_more_digits(text, sign, (from, whole));
+    }
+    if count == 0 || byte_at(text, end) == b'.' {
         return None;
     }
-    scanner.advance(end - start);
-    let magnitude = mantissa.cast_signed() as f64 / POWERS_OF_TEN[fraction];
-    Some(if sign == b'-' { -magnitude } else { magnitude })
+    let magnitude = value_of(digits, count);
+    Some((signed(sign, magnitude, count - whole), end))
+}
+
+/// A number of more than eight digits, of which the first `whole`, from byte `from` on, stand before the point.
+#[inline(never)]
+fn of_more_digits(text: &[u8], sign: u8, (from, whole): (usize, usize)) -> Option<(f64, usize)> {
+    let below_one = eight_at(text, from + whole + 1);
+    let fraction = count_digits(below_one);
+    let end = from + whole + 1 + fraction;
+    if fraction == EIGHT || fraction == 0 || byte_at(text, end) == b'.' {
+        return None;
+    }
+    let before_point = match whole {
+        0 => 0,
+        _ => value_of(eight_at(text, from), whole),
+    };
+    let mantissa = before_point * POWERS_OF_TEN_WHOLE[fraction] + value_of(below_one, fraction);
+    Some((signed(sign, mantissa, fraction), end))
+}
+
+/// The number with these digits, of which the last `fraction` stand behind the point.
+#[inline]
+fn signed(sign: u8, digits: u64, fraction: usize) -> f64 {
+    let magnitude = digits.cast_signed() as f64 / POWERS_OF_TEN[fraction];
+    if sign == b'-' { -magnitude } else { magnitude }
 }
 
 /// Digits that are read at a time.
@@ -74,23 +108,24 @@ const POWERS_OF_TEN_WHOLE: [u64; EIGHT + 1] = [
     100_000_000,
 ];
 
-/// The digits at the start of `text`, of which there are at most eight here, as a number, and how many they are. `text` holds
-/// the first byte lowest.
+/// How many of eight bytes are digits before the first that is none. The first byte is the lowest.
 #[inline]
-fn few_digits(text: u64) -> (u64, usize) {
+fn count_digits(eight: u64) -> usize {
     // Each byte becomes its digit; what is none is more than nine, and shows as the highest bit of its byte.
-    let values = text ^ 0x3030_3030_3030_3030;
+    let values = eight ^ 0x3030_3030_3030_3030;
     let others = (values.wrapping_add(0x7676_7676_7676_7676) | values) & 0x8080_8080_8080_8080;
-    let count = others.trailing_zeros() as usize / 8;
-    if count == 0 {
-        return (0, 0);
-    }
+    others.trailing_zeros() as usize / 8
+}
+
+/// The number that the first `count` of eight bytes are, which are digits; there is at least one.
+#[inline]
+fn value_of(eight: u64, count: usize) -> u64 {
     // Set to the right with zeros before them, in pairs, then fours, then all eight.
-    let values = values << (64 - 8 * count);
+    let values = (eight ^ 0x3030_3030_3030_3030) << (64 - 8 * count);
     let pairs = values.wrapping_mul(10) + (values >> 8);
     let low = (pairs & 0x0000_00ff_0000_00ff).wrapping_mul(0x000f_4240_0000_0064);
     let high = ((pairs >> 16) & 0x0000_00ff_0000_00ff).wrapping_mul(0x0000_2710_0000_0001);
-    (low.wrapping_add(high) >> 32, count)
+    low.wrapping_add(high) >> 32
 }
 
 /// Reads any number, digit by digit.

@@ -2,6 +2,7 @@
 
 use super::expression::{Context, Parameter};
 use super::line_words::{Assignment, Code, LineWords, Target};
+use super::number;
 use super::scan::Scanner;
 use crate::line_error::{Checked, LineError, Span};
 use crate::state::parameters::{predefined_name, read_only};
@@ -19,24 +20,66 @@ pub(crate) fn parse(
     context: &Context,
     words: &mut LineWords,
 ) -> Checked<()> {
-    let mut scanner = Scanner::new(text, from);
-    loop {
-        match scanner.peek() {
-            letter @ (b'a'..=b'z' | b'A'..=b'Z') => {
-                word(letter.to_ascii_uppercase(), &mut scanner, context, words)?;
-            }
-            b' ' => scanner.advance(1),
-            _ if scanner.at_end() => return Ok(()),
-            b'\t' | b'(' | b';' => {
-                scanner.skip_ignorable()?;
-                words.abort = scanner.abort();
-            }
-            byte @ (b'@' | b'^') => polar(byte, &mut scanner, context, words)?,
-            b'#' => assignment(&mut scanner, context, words)?,
-            b'$' => spindle(&mut scanner, context, words)?,
-            other => return Err(unexpected(other, scanner.here())),
-        }
+    let mut scanner = Scanner::new(text, plain_words(text, from, words));
+    while !scanner.at_end() {
+        read_one(&mut scanner, context, words)?;
+        let behind = plain_words(text, scanner.at(), words);
+        scanner.advance(behind - scanner.at());
     }
+    Ok(())
+}
+
+/// Reads the words at byte `at` of `text` that are a letter with a short number behind it, which nearly all are. Where the first
+/// one that is not begins, or what is wrong: [`read_one`] reads that, and would have read these alike. No short number is too
+/// large a value.
+#[inline]
+fn plain_words(text: &[u8], mut at: usize, words: &mut LineWords) -> usize {
+    while let Some(byte) = text.get(at) {
+        let letter = byte.to_ascii_uppercase();
+        if *byte == b' ' {
+            at += 1;
+            continue;
+        }
+        if !letter.is_ascii_uppercase() || letter == b'O' || words.has(letter) {
+            break;
+        }
+        let Some((value, end)) = number::short(text, at + 1) else {
+            break;
+        };
+        let span = Span::new(at, end);
+        let taken = match letter {
+            b'G' => whole_code(value, span).is_some_and(|code| words.g.take(code)),
+            b'M' => whole_code(value, span).is_some_and(|code| words.m.take(code)),
+            _ => {
+                words.set(letter, value, span);
+                true
+            }
+        };
+        if !taken {
+            break;
+        }
+        at = end;
+    }
+    at
+}
+
+/// Reads the next word, or what else may stand there.
+fn read_one(scanner: &mut Scanner, context: &Context, words: &mut LineWords) -> Checked<()> {
+    match scanner.peek() {
+        letter @ (b'a'..=b'z' | b'A'..=b'Z') => {
+            word(letter.to_ascii_uppercase(), scanner, context, words)?;
+        }
+        b' ' => scanner.advance(1),
+        b'\t' | b'(' | b';' => {
+            scanner.skip_ignorable()?;
+            words.abort = scanner.abort();
+        }
+        byte @ (b'@' | b'^') => polar(byte, scanner, context, words)?,
+        b'#' => assignment(scanner, context, words)?,
+        b'$' => spindle(scanner, context, words)?,
+        other => return Err(unexpected(other, scanner.here())),
+    }
+    Ok(())
 }
 
 #[inline]
@@ -129,12 +172,17 @@ fn in_word(letter: u8, start: usize, error: LineError) -> LineError {
 #[inline]
 fn code(letter: char, value: f64, span: Span) -> Checked<Code> {
     // Nearly all are whole.
+    whole_code(value, span).map_or_else(|| broken_code(letter, value, span), Ok)
+}
+
+/// The code of a word as G1.
+#[inline]
+fn whole_code(value: f64, span: Span) -> Option<Code> {
     let whole = value as u16;
-    if f64::from(whole) == value && whole < 1000 {
-        let tenths = whole * 10;
-        return Ok(Code { tenths, span });
-    }
-    broken_code(letter, value, span)
+    (f64::from(whole) == value && whole < 1000).then(|| Code {
+        tenths: whole * 10,
+        span,
+    })
 }
 
 /// The code of a word as G61.1.
@@ -269,4 +317,45 @@ fn unexpected(byte: u8, span: Span) -> LineError {
         _ => "no word begins with this character",
     };
     LineError::new(span, "unexpected", why)
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use crate::interpreter::Interpreter;
+    use crate::testing::mill;
+    use proptest::prelude::*;
+
+    /// Lines of words as programs have them, and of what else may stand between them.
+    pub fn any_line() -> impl Strategy<Value = String> {
+        let words = "G0 G1 g1 G01 G2 G53 G61.1 G80 G92 G1000 M3 M199 X#1 X[1+2] Y5 z-.5 F100 N7 T2 TA5 TABS[1] O5 @1 ^2 $0 #1=2             #<a>=3 (c) (abort,c) ; / % E5 X- Y. \u{e9}";
+        let words = prop::sample::select(words.split(' ').collect::<Vec<_>>());
+        let number = r"[A-Za-z][ \t]?[+-]?[0-9]{0,9}(\.[0-9]{0,9})?";
+        let axis = r"[XYZ][+-]?[0-9]{1,3}(\.[0-9]{0,5})?";
+        let part = prop_oneof![
+            2 => words.prop_map(str::to_owned),
+            1 => number,
+            4 => axis,
+            1 => r"[ \t]{1,2}",
+        ];
+        prop::collection::vec(part, 0..7).prop_map(|parts| parts.concat())
+    }
+
+    proptest! {
+        /// Words that are read the short way are read as one by one, and what is wrong is found at the same place.
+        #[test]
+        fn plain_words_are_read_as_any_word_is(line in any_line()) {
+            let interpreter = Interpreter::new(mill());
+            let context = interpreter.context();
+            let (mut words, mut one_by_one) = (LineWords::default(), LineWords::default());
+            let read = parse(line.as_bytes(), 0, &context, &mut words);
+            let mut scanner = Scanner::new(line.as_bytes(), 0);
+            let mut expected = Ok(());
+            while !scanner.at_end() && expected.is_ok() {
+                expected = read_one(&mut scanner, &context, &mut one_by_one);
+            }
+            prop_assert_eq!(format!("{read:?}"), format!("{expected:?}"));
+            prop_assert_eq!(format!("{words:?}"), format!("{one_by_one:?}"));
+        }
+    }
 }

@@ -28,6 +28,11 @@ impl<'t> Scanner<'t> {
         self.abort
     }
 
+    /// The line.
+    pub fn text(&self) -> &'t [u8] {
+        self.text
+    }
+
     /// The rest of the line.
     pub fn rest(&self) -> &'t [u8] {
         &self.text[self.at..]
@@ -46,35 +51,6 @@ impl<'t> Scanner<'t> {
             .copied()
             .unwrap_or(0)
             .to_ascii_uppercase()
-    }
-
-    /// The byte at `at`; 0 behind the end.
-    #[inline]
-    pub fn byte_at(&self, at: usize) -> u8 {
-        self.text.get(at).copied().unwrap_or(0)
-    }
-
-    /// Eight bytes from `at` on, the first one lowest; 0 behind the end.
-    #[inline]
-    pub fn eight_at(&self, at: usize) -> u64 {
-        if let Some(eight) = self.text.get(at..).and_then(<[u8]>::first_chunk) {
-            return u64::from_le_bytes(*eight);
-        }
-        // The last eight bytes of the line, moved down.
-        match self.text.last_chunk() {
-            Some(last) if at < self.text.len() => {
-                u64::from_le_bytes(*last) >> (8 * (at + 8 - self.text.len()))
-            }
-            _ => self.few_at(at),
-        }
-    }
-
-    /// The same in a line that is shorter.
-    #[cold]
-    fn few_at(&self, at: usize) -> u64 {
-        (0..8).fold(0, |eight, i| {
-            eight | u64::from(self.byte_at(at + i)) << (8 * i)
-        })
     }
 
     pub fn at_end(&self) -> bool {
@@ -177,6 +153,33 @@ impl<'t> Scanner<'t> {
             .count();
         Span::new(self.at, (self.at + 1 + tail).min(self.text.len()))
     }
+}
+
+/// The byte of `text` at `at`; 0 behind the end.
+#[inline]
+pub(crate) fn byte_at(text: &[u8], at: usize) -> u8 {
+    text.get(at).copied().unwrap_or(0)
+}
+
+/// Eight bytes of `text` from `at` on, the first one lowest; 0 behind the end.
+#[inline]
+pub(crate) fn eight_at(text: &[u8], at: usize) -> u64 {
+    if let Some(eight) = text.get(at..).and_then(<[u8]>::first_chunk) {
+        return u64::from_le_bytes(*eight);
+    }
+    // The last eight bytes of the line, moved down.
+    match text.last_chunk() {
+        Some(last) if at < text.len() => u64::from_le_bytes(*last) >> (8 * (at + 8 - text.len())),
+        _ => few_at(text, at),
+    }
+}
+
+/// The same in a line that is shorter.
+#[cold]
+fn few_at(text: &[u8], at: usize) -> u64 {
+    (0..8).fold(0, |eight, i| {
+        eight | u64::from(byte_at(text, at + i)) << (8 * i)
+    })
 }
 
 /// What a comment begins with that ends the program.

@@ -90,13 +90,11 @@ pub(super) fn line_to(line: &mut Line, kind: BlockKind) -> Checked<()> {
             line.check_travel(axis, end[axis], end[axis])?;
         }
     }
-    // Set field by field: what is copied from a blank one is copied in pieces that wait for each other.
-    let mut block = line.state.blank_block();
-    block.kind = kind;
-    block.end = end;
-    block.length_mm = length_mm;
-    block.feed_mm_per_s = feed_mm_per_s;
-    line.push(block);
+    line.push_to(end, |block| {
+        block.kind = kind;
+        block.length_mm = length_mm;
+        block.feed_mm_per_s = feed_mm_per_s;
+    });
     Ok(())
 }
 

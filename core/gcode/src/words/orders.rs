@@ -83,6 +83,45 @@ impl Orders {
     /// all the same, so that reading can go on.
     #[inline]
     pub fn sort(&mut self, words: &LineWords, modal: MotionMode, letters: &Letters) -> Checked<()> {
+        if self.sort_straight(words, modal, letters) {
+            return Ok(());
+        }
+        self.sort_any(words, modal, letters)
+    }
+
+    /// Sorts a line whose only G word, if any, is that of a straight line, and which has axis words for it: nearly all are such.
+    /// Whether it is one; [`Self::sort_any`] would have sorted it alike.
+    #[inline]
+    fn sort_straight(&mut self, words: &LineWords, modal: MotionMode, letters: &Letters) -> bool {
+        let (word, span) = match (words.g.as_slice(), modal) {
+            ([], MotionMode::Word(word)) => (word, None),
+            ([code], _) => match super::find(b'G', code.tenths) {
+                Some(word) => (word, Some(code.span)),
+                None => return false,
+            },
+            _ => return false,
+        };
+        let axes = words.present & AXIS_MASK;
+        let is_straight = matches!(word.action, Action::Move(Shape::Straight, _))
+            && words.m.as_slice().is_empty()
+            && words.polar.is_none()
+            && axes != 0
+            && axes & !letters.mask == 0
+            && words.present & !(ALWAYS | word.mask) == 0;
+        if !is_straight {
+            return false;
+        }
+        self.clear();
+        if let Some(span) = span {
+            self.present = word.group.bit();
+            self.words[word.group as usize] = (word, span);
+        }
+        self.motion = Some(MotionMode::Word(word));
+        true
+    }
+
+    /// Sorts any line.
+    fn sort_any(&mut self, words: &LineWords, modal: MotionMode, letters: &Letters) -> Checked<()> {
         self.clear();
         let mut claims = Claims::default();
         let g = self.sort_kind(b'G', words.g.as_slice(), words, &mut claims);
@@ -393,4 +432,50 @@ fn takers(letter: u8) -> String {
         .chain((letter == b'$').then_some("S"))
         .collect::<Vec<_>>()
         .join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::interpreter::Interpreter;
+    use crate::syntax::parse::{parse, tests::any_line};
+    use crate::testing::mill;
+    use proptest::prelude::*;
+
+    fn shown(orders: &Orders) -> String {
+        let groups = (0..GROUPS).filter(|group| orders.present >> group & 1 != 0);
+        let words: Vec<_> = groups
+            .map(|group| (group, orders.words[group].0.code, orders.words[group].1))
+            .collect();
+        let motion = match orders.motion {
+            None => "none",
+            Some(MotionMode::None) => "no mode",
+            Some(MotionMode::Refused) => "refused",
+            Some(MotionMode::Word(word)) => word.code,
+        };
+        format!("{words:?} {motion} {}", orders.axes_taken)
+    }
+
+    proptest! {
+        /// What is sorted the short way is sorted as any line is, in whatever motion mode.
+        #[test]
+        fn straight_lines_are_sorted_as_any_line_is(line in any_line(), mode in 0..8usize) {
+            let interpreter = Interpreter::new(mill());
+            let letters = Letters::new(&mill().axes);
+            let modal = match mode {
+                0 => MotionMode::None,
+                1 => MotionMode::Refused,
+                _ => MotionMode::Word(super::super::find(b'G', [0, 10, 20, 382, 810, 50][mode - 2]).unwrap()),
+            };
+            let mut words = LineWords::default();
+            let _ = parse(line.as_bytes(), 0, &interpreter.context(), &mut words);
+            let (mut orders, mut expected) = (Orders::new(), Orders::new());
+            let (sorted, any) = (
+                orders.sort(&words, modal, &letters),
+                expected.sort_any(&words, modal, &letters),
+            );
+            prop_assert_eq!(format!("{sorted:?}"), format!("{any:?}"));
+            prop_assert_eq!(shown(&orders), shown(&expected));
+        }
+    }
 }
