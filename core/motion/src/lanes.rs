@@ -67,10 +67,18 @@ pub fn smaller(a: f64, b: f64) -> f64 {
     if b < a { b } else { a }
 }
 
-/// The largest of all lanes.
+/// The largest of all lanes that are numbers; minus infinity where none is one. Half of them are compared with the other half: taken one
+/// by one from the first on they would be kept in reverse, and turned round in every step of the loop before.
 #[inline(always)]
 pub fn largest<const L: usize>(values: &Lanes<L>) -> f64 {
-    values
-        .iter()
-        .fold(f64::NEG_INFINITY, |most, v| larger(most, *v))
+    let mut most: Lanes<L> = each(|l| larger(f64::NEG_INFINITY, values[l]));
+    let mut count = L;
+    while count > 1 {
+        let half = count.div_ceil(2);
+        for l in half..count {
+            most[l - half] = larger(most[l - half], most[l]);
+        }
+        count = half;
+    }
+    most[0]
 }

@@ -11,12 +11,9 @@ use crate::plan::{Effort, Planning};
 use crate::profile;
 use crate::route::{Item, Route};
 use crate::span::Span;
-use crate::tuning::Tuning;
+use crate::tuning::{COMMIT, Tuning};
 use crate::window::{Piece, Start, State, Window};
 
-/// Part of a window in which it may be left for the next. Left at 0.40 of it at the latest, the programs of docs/smooth-planner.md
-/// take 6 to 13 % longer.
-const COMMIT: (f64, f64) = (0.42, 0.80);
 /// Speeds that count as equal when the place to leave is chosen.
 const EQUAL: f64 = 0.995;
 /// What a refused plan moves that place by, as a share of the window. Behind the

@@ -14,7 +14,8 @@ tandem_sdk::options! {
         pub window_ms: f64 = 0.0,
         /// Share of the tolerance that the first try uses: 0.5 to 1.
         pub tolerance_share: f64 = 0.955,
-        /// Turns of smoothing and retiming for a window in motion; one from rest has twice as many: 1 to 8.
+        /// Turns of smoothing and retiming for a window in motion; one that goes at its feed all the way has one, one from rest twice as
+        /// many: 1 to 8.
         pub rounds: u32 = 2,
     }
 }

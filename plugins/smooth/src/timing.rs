@@ -28,11 +28,16 @@ const RAMP: f64 = 0.35;
 /// Factor from one speed tried to the next.
 const SLOWER: f64 = 0.9;
 
+/// Share of the speed that a place allows from which on it is as good as reached.
+const AT_FEED: f64 = 0.99;
+
 /// A place on the path.
 #[derive(Clone, Copy, Debug)]
 struct Node {
     s: f64,
     speed: f64,
+    /// What feed and axis speeds allow here.
+    most: f64,
     /// Along the path.
     acceleration: f64,
     jerk: f64,
@@ -128,6 +133,21 @@ fn cap<const L: usize>(
 }
 
 impl Timing {
+    /// Whether the path that was timed last goes as fast as it may for this time.
+    pub fn is_at_feed(&self, until_s: f64) -> bool {
+        let mut t = 0.0;
+        for pair in self.nodes.windows(2) {
+            if t >= until_s {
+                break;
+            }
+            if pair[1].speed < AT_FEED * pair[1].most {
+                return false;
+            }
+            t += 2.0 * (pair[1].s - pair[0].s) / (pair[0].speed + pair[1].speed);
+        }
+        true
+    }
+
     /// Times the path from `reach.s` on, behind the `marks` that are known already; the last mark is at rest.
     #[inline(always)]
     pub fn make<const L: usize>(
@@ -204,11 +224,11 @@ impl Timing {
         loop {
             directions.at = run.chord_at(s, directions.at);
             let chord = &run.chords[directions.at];
-            let speed = feed(chord, counted).min(along(&limits, &chord.direction));
+            let limit = feed(chord, counted).min(along(&limits, &chord.direction));
             let jerk = along(&frame.jerk, &chord.direction);
             let tolerance = chord.tolerance;
             let next = run.chords.get(directions.at + 1);
-            let speed = speed.min(polygon_speed(chord, next, jerk));
+            let speed = limit.min(polygon_speed(chord, next, jerk));
             let corner = tolerance / frame.jerk[0].min(jerk);
             if corner != last_corner.0 {
                 last_corner = (corner, (6.0 * corner).cbrt());
@@ -221,6 +241,7 @@ impl Timing {
             let mut node = Node {
                 s,
                 speed: cap,
+                most: limit,
                 acceleration,
                 jerk,
             };

@@ -14,6 +14,9 @@ const HOPELESS: f64 = 1e3;
 /// How near to its bound a step may go.
 const BOUNDARY: f64 = 0.95;
 
+/// Which entry of the upper triangle of a Hessian, row by row, is in a row and a column.
+const AT: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
+
 /// How solving starts.
 #[derive(Clone, Copy, Debug)]
 struct Start {
@@ -73,11 +76,13 @@ pub struct Factors<const L: usize> {
 #[repr(C, align(64))]
 struct Sites<const L: usize, const GROUPS: usize> {
     interval: [usize; WIDE],
+    /// Each interval follows the one before.
+    follow: bool,
     /// 1 where the time of the interval counts here: once for each.
     timed: Wide,
     /// Weights of b at each place.
     values: [[Wide; 3]; PLACES],
-    /// Of every axis.
+    /// Of the axes that move, one behind the other.
     forms: [[Form; GROUPS]; L],
     most: [Wide; PLACES],
     /// How many there are. Behind the last of all it stands again, and is not counted twice in what is sought.
@@ -88,6 +93,7 @@ impl<const L: usize, const GROUPS: usize> Sites<L, GROUPS> {
     const NONE: Self = Self {
         count: 0,
         interval: [0; WIDE],
+        follow: false,
         timed: [0.0; WIDE],
         values: [[[0.0; WIDE]; 3]; PLACES],
         forms: [[[[0.0; WIDE]; 3]; GROUPS]; L],
@@ -156,8 +162,7 @@ fn sides(w: &[Wide; 3], beta: &[Wide; 3], min_rate_squared: f64) -> Sides {
     let weight: Wide = each(|i| 0.5 * inverse[i] / b[i]);
     Sides {
         weight,
-        common: each(|i| weight[i] * b[i]),
-        right: each(|i| 1.5 * inverse[i]),
+        over: each(|i| weight[i] * b[i] - 1.5 * inverse[i]),
     }
 }
 
@@ -176,9 +181,19 @@ fn places<const L: usize, const GROUPS: usize>(
     ]
 }
 
-/// The coefficients that count in each interval.
+/// The coefficients that count in each interval of sites.
 #[inline(always)]
-fn beta(coefficients: &[f64], interval: &[usize; WIDE]) -> [Wide; 3] {
+fn beta<const L: usize, const GROUPS: usize>(
+    coefficients: &[f64],
+    sites: &Sites<L, GROUPS>,
+) -> [Wide; 3] {
+    let interval = &sites.interval;
+    if sites.follow {
+        let c: &[f64; WIDE + 2] = coefficients[interval[0]..]
+            .first_chunk()
+            .expect("coefficients of all intervals");
+        return [0, 1, 2].map(|n| each(|i| c[n + i]));
+    }
     let mut beta = [[0.0; WIDE]; 3];
     for (i, k) in interval.iter().enumerate() {
         let c: &[f64; 3] = coefficients[*k..]
@@ -237,6 +252,7 @@ impl<const L: usize, const GROUPS: usize> Retimer<L, GROUPS> {
     ) {
         let r1 = 1.0 / self.step_s;
         let r2 = 1.0 / (self.step_s * self.step_s);
+        let moving = &self.moving[..self.moving_count];
         let at = self.count % WIDE;
         if self.count / WIDE == self.sites.len() {
             self.sites.push(Sites::NONE);
@@ -255,7 +271,7 @@ impl<const L: usize, const GROUPS: usize> Retimer<L, GROUPS> {
                 sites.values[n][i][at] = value[i];
             }
             let per_share = 1.0 / point.jerk_share;
-            for l in &self.moving[..self.moving_count] {
+            for (form, l) in sites.forms.iter_mut().zip(moving) {
                 let per_jerk = factors.per_jerk[*l] * per_share;
                 let [third, second, first] = [
                     per_jerk * point.third[*l],
@@ -263,29 +279,32 @@ impl<const L: usize, const GROUPS: usize> Retimer<L, GROUPS> {
                     per_jerk * (0.5 * r2) * point.first[*l],
                 ];
                 for i in 0..3 {
-                    sites.forms[*l][n][i][at] =
-                        third * value[i] + second * slope[i] + first * curve[i];
+                    form[n][i][at] = third * value[i] + second * slope[i] + first * curve[i];
                 }
             }
             if n >= Self::ACCELERATIONS {
                 continue;
             }
             let per_share = 1.0 / point.acceleration_share;
-            for l in &self.moving[..self.moving_count] {
+            for (form, l) in sites.forms.iter_mut().zip(moving) {
                 let per_acceleration = factors.per_acceleration[*l] * per_share;
                 let second = per_acceleration * point.second[*l];
                 let first = per_acceleration * (0.5 * r1) * point.first[*l];
                 for i in 0..3 {
-                    sites.forms[*l][PLACES + n][i][at] = second * value[i] + first * slope[i];
+                    form[PLACES + n][i][at] = second * value[i] + first * slope[i];
                 }
             }
         }
     }
 
-    /// Fills the lanes behind the last site with that.
+    /// Fills the lanes behind the last site with that, and notes which sites are of intervals that follow each other.
     fn fill_up(&mut self) {
         self.sites.truncate(self.count.div_ceil(WIDE));
         self.rows.truncate(self.sites.len());
+        for sites in &mut self.sites {
+            let k = sites.interval[0];
+            sites.follow = sites.count == WIDE && (1..WIDE).all(|at| sites.interval[at] == k + at);
+        }
         let Some(sites) = self.sites.last_mut() else {
             return;
         };
@@ -339,14 +358,19 @@ impl<const L: usize, const GROUPS: usize> Retimer<L, GROUPS> {
         };
         let mut shrink = 0.1;
         loop {
-            let target = shrink * status.gap;
-            status.violation = self.assemble(target);
-            let good = status.gap < asked.gap && status.violation < asked.violation;
+            let near = status.gap < asked.gap;
             // Multipliers grow without bound where no rate keeps the rows.
             let lost = status.gap > HOPELESS || status.gap.is_nan();
-            if good || lost || status.iterations == asked.iterations {
-                return status;
+            let over = lost || status.iterations == asked.iterations;
+            // How far rows are violated takes a fifth of a system, and counts only where nothing is left but them.
+            if near || over {
+                status.violation = self.violation();
+                if over || status.violation < asked.violation {
+                    return status;
+                }
             }
+            let target = shrink * status.gap;
+            self.assemble(target);
             self.matrix.solve(&mut self.step);
             let length = self.advance(target);
             shrink = match length {
@@ -381,16 +405,16 @@ impl<const L: usize, const GROUPS: usize> Retimer<L, GROUPS> {
     #[inline(always)]
     fn start(&mut self, start: Start) {
         for (sites, rows) in self.sites.iter().zip(&mut self.rows) {
-            let beta = beta(&self.rate.coefficients, &sites.interval);
+            let beta = beta(&self.rate.coefficients, sites);
             let places = places(sites, &beta, self.min_rate_squared);
-            for l in &self.moving[..self.moving_count] {
-                for group in 0..GROUPS {
-                    let value = dot(&sites.forms[*l][group], &beta);
+            let forms = &sites.forms[..self.moving_count];
+            for (form, pairs) in forms.iter().zip(&mut rows.pairs) {
+                for (group, pair) in pairs.iter_mut().enumerate() {
+                    let value = dot(&form[group], &beta);
                     let room = match places.get(group) {
-                        Some(place) => each(|i| place.right[i] - place.common[i]),
+                        Some(place) => each(|i| -place.over[i]),
                         None => [1.0; WIDE],
                     };
-                    let pair = &mut rows.pairs[*l][group];
                     for (n, sign) in [1.0, -1.0].into_iter().enumerate() {
                         pair.slack[n] = each(|i| larger(room[i] - sign * value[i], start.slack));
                         pair.multiplier[n] = each(|i| start.product / pair.slack[n][i]);
@@ -418,41 +442,63 @@ impl<const L: usize, const GROUPS: usize> Retimer<L, GROUPS> {
         products.iter().sum::<f64>() / (WIDE * self.rows.len() * (pairs + Self::BOUNDS + 1)) as f64
     }
 
-    /// The Newton system with `f = Σ b^(−1/2)` in the middles; gives the largest violation.
+    /// The largest violation of a row at the present rate.
     #[inline(always)]
-    fn assemble(&mut self, target: f64) -> f64 {
+    fn violation(&self) -> f64 {
+        let mut most = [0.0; WIDE];
+        for sites in &self.sites {
+            let beta = beta(&self.rate.coefficients, sites);
+            let places = places(sites, &beta, self.min_rate_squared);
+            for form in &sites.forms[..self.moving_count] {
+                for (group, form) in form.iter().enumerate() {
+                    let value = dot(form, &beta);
+                    let size: Wide = each(|i| value[i].abs());
+                    most = match places.get(group) {
+                        Some(place) => each(|i| larger(most[i], place.over[i] + size[i])),
+                        None => each(|i| larger(most[i], size[i] - 1.0)),
+                    };
+                }
+            }
+            let along = [0, 1, 2].map(|n| dot(&sites.values[n], &beta));
+            for n in 0..Self::BOUNDS {
+                most = each(|i| larger(most[i], along[n][i] - sites.most[n][i]));
+            }
+            most = each(|i| larger(most[i], self.min_rate_squared - along[1][i]));
+        }
+        largest(&most)
+    }
+
+    /// The Newton system with `f = Σ b^(−1/2)` in the middles.
+    #[inline(always)]
+    fn assemble(&mut self, target: f64) {
         self.matrix.clear(self.unknowns);
         self.step.clear();
         self.step.resize(self.unknowns, 0.0);
-        let mut violation = [0.0; WIDE];
         for k in 0..self.sites.len() {
             let sites = &self.sites[k];
-            let beta = beta(&self.rate.coefficients, &sites.interval);
+            let beta = beta(&self.rate.coefficients, sites);
             let places = places(sites, &beta, self.min_rate_squared);
             let rows = &mut self.rows[k];
-            let mut share = Share {
-                violation,
-                ..Share::default()
-            };
+            let mut share = Share::default();
+            let forms = &sites.forms[..self.moving_count];
+            let pairs = &mut rows.pairs[..self.moving_count];
             for (group, place) in places.iter().enumerate() {
                 rows.weight[group] = place.weight;
                 let w = &sites.values[group];
                 let common = [0, 1, 2].map(|n| each(|i| w[n][i] * place.weight[i]));
-                for l in &self.moving[..self.moving_count] {
-                    let form = &sites.forms[*l][group];
+                for (form, pair) in forms.iter().zip(&mut *pairs) {
                     share.jerk(
-                        form,
+                        &form[group],
                         &beta,
                         (place, &common),
-                        &mut rows.pairs[*l][group],
+                        &mut pair[group],
                         target,
                     );
                 }
             }
             for group in PLACES..GROUPS {
-                for l in &self.moving[..self.moving_count] {
-                    let form = &sites.forms[*l][group];
-                    share.acceleration(form, &beta, &mut rows.pairs[*l][group], target);
+                for (form, pair) in forms.iter().zip(&mut *pairs) {
+                    share.acceleration(&form[group], &beta, &mut pair[group], target);
                 }
             }
             for n in 0..Self::BOUNDS {
@@ -475,34 +521,53 @@ impl<const L: usize, const GROUPS: usize> Retimer<L, GROUPS> {
             let slope: Wide = each(|i| -sites.timed[i] * places[1].weight[i]);
             let bend = each(|i| -1.5 * slope[i] / larger(b[i], self.min_rate_squared));
             share.add(middle, &bend, &slope);
-            violation = share.violation;
             let (interval, count) = (sites.interval, sites.count);
+            if sites.follow
+                && let Some(first) = self.first_of_row(interval[0])
+            {
+                self.scatter_all(first, &share);
+                continue;
+            }
             for at in 0..count {
                 self.scatter(interval[at], &share, at);
             }
         }
-        largest(&violation)
     }
 
+    /// The first unknown of as many intervals as there are lanes, from `k` on, where all of their coefficients are unknowns of their own.
+    #[inline(always)]
+    fn first_of_row(&self, k: usize) -> Option<usize> {
+        let unknown: &[i32; WIDE + 2] = self.unknown[k..].first_chunk()?;
+        let first = usize::try_from(unknown[0]).ok()?;
+        let last = usize::try_from(unknown[WIDE + 1]).ok()?;
+        (last == first + WIDE + 1).then_some(first)
+    }
+
+    /// Adds the shares of intervals that follow each other to the system.
+    #[inline(always)]
+    fn scatter_all(&mut self, first: usize, share: &Share) {
+        let rows: &mut [[f64; 3]; WIDE + 2] = self.matrix.rows[first..]
+            .first_chunk_mut()
+            .expect("unknowns of their own");
+        let step: &mut [f64; WIDE + 2] = self.step[first..]
+            .first_chunk_mut()
+            .expect("unknowns of their own");
+        for at in 0..WIDE {
+            for i in 0..3 {
+                for j in i..3 {
+                    rows[at + i][j - i] += share.hessian[AT[i][j]][at];
+                }
+                step[at + i] -= share.gradient[i][at];
+            }
+        }
+    }
+
+    /// Adds the share of one interval.
     #[inline(always)]
     fn scatter(&mut self, k: usize, share: &Share, at: usize) {
-        const AT: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
         let hessian = share.hessian.map(|entry| entry[at]);
         let gradient = share.gradient.map(|entry| entry[at]);
         let unknown: [i32; 3] = *self.unknown[k..].first_chunk().expect("three coefficients");
-        if unknown[0] >= 0 && unknown[1] == unknown[0] + 1 && unknown[2] == unknown[1] + 1 {
-            let first = unknown[0] as usize;
-            let rows: &mut [[f64; 3]; 3] = self.matrix.rows[first..]
-                .first_chunk_mut()
-                .expect("three unknowns");
-            for (i, row) in rows.iter_mut().enumerate() {
-                for j in i..3 {
-                    row[j - i] += hessian[AT[i][j]];
-                }
-                self.step[first + i] -= gradient[i];
-            }
-            return;
-        }
         for i in 0..3 {
             let Ok(row) = usize::try_from(unknown[i]) else {
                 continue;
@@ -520,23 +585,21 @@ impl<const L: usize, const GROUPS: usize> Retimer<L, GROUPS> {
     /// Goes along the step as far as slacks and multipliers stay positive; gives the length of the primal step.
     #[inline(always)]
     fn advance(&mut self, target: f64) -> f64 {
-        let (length, back) = self.turn_into_changes(target);
+        let (length, back) = self.turn_into_falls(target);
         let mut products = [0.0; WIDE];
         for rows in &mut self.rows {
-            for l in &self.moving[..self.moving_count] {
-                for pair in &mut rows.pairs[*l] {
+            for pairs in &mut rows.pairs[..self.moving_count] {
+                for pair in pairs {
                     for n in 0..2 {
-                        let (slack, multiplier, change) =
+                        let (slack, multiplier, fall) =
                             (pair.slack[n], pair.multiplier[n], pair.residual[n]);
                         let inverse = &pair.inverse[n];
-                        let new_slack: Wide = each(|i| slack[i] + length * change[i]);
+                        let new_slack: Wide = each(|i| slack[i] - length * fall[i]);
                         // Δλ = (target − λ·(s + Δs))/s.
                         let new_multiplier: Wide = each(|i| {
                             let per_slack = multiplier[i] * inverse[i];
                             multiplier[i]
-                                + back
-                                    * (target - multiplier[i] * (slack[i] + change[i]))
-                                    * per_slack
+                                + back * (target - multiplier[i] * (slack[i] - fall[i])) * per_slack
                         });
                         products = each(|i| products[i] + new_slack[i] * new_multiplier[i]);
                         pair.slack[n] = new_slack;
@@ -545,13 +608,12 @@ impl<const L: usize, const GROUPS: usize> Retimer<L, GROUPS> {
                 }
             }
             for single in &mut rows.singles[..=Self::BOUNDS] {
-                let (slack, multiplier, change) =
-                    (single.slack, single.multiplier, single.residual);
-                single.slack = each(|i| slack[i] + length * change[i]);
+                let (slack, multiplier, fall) = (single.slack, single.multiplier, single.residual);
+                single.slack = each(|i| slack[i] - length * fall[i]);
                 single.multiplier = each(|i| {
                     let per_slack = multiplier[i] * single.inverse[i];
                     multiplier[i]
-                        + back * (target - multiplier[i] * (slack[i] + change[i])) * per_slack
+                        + back * (target - multiplier[i] * (slack[i] - fall[i])) * per_slack
                 });
                 products = each(|i| products[i] + single.slack[i] * single.multiplier[i]);
             }
@@ -563,9 +625,9 @@ impl<const L: usize, const GROUPS: usize> Retimer<L, GROUPS> {
         length
     }
 
-    /// Replaces residuals by the changes of the slacks; gives how far slacks and multipliers may go.
+    /// Replaces residuals by how much the slacks fall; gives how far slacks and multipliers may go.
     #[inline(always)]
-    fn turn_into_changes(&mut self, target: f64) -> (f64, f64) {
+    fn turn_into_falls(&mut self, target: f64) -> (f64, f64) {
         let step = &self.step;
         self.change.clear();
         self.change.extend(
@@ -575,35 +637,35 @@ impl<const L: usize, const GROUPS: usize> Retimer<L, GROUPS> {
         );
         let mut reach = Reach::default();
         for (sites, rows) in self.sites.iter().zip(&mut self.rows) {
-            let step = beta(&self.change, &sites.interval);
+            let step = beta(&self.change, sites);
             let along = [0, 1, 2].map(|n| dot(&sites.values[n], &step));
-            for l in &self.moving[..self.moving_count] {
-                for group in 0..GROUPS {
-                    let value = dot(&sites.forms[*l][group], &step);
+            let forms = &sites.forms[..self.moving_count];
+            for (form, pairs) in forms.iter().zip(&mut rows.pairs) {
+                for (group, pair) in pairs.iter_mut().enumerate() {
+                    let value = dot(&form[group], &step);
                     // Rows of acceleration have no part in b.
                     let common = match along.get(group) {
                         Some(along) => each(|i| rows.weight[group][i] * along[i]),
                         None => [0.0; WIDE],
                     };
-                    let pair = &mut rows.pairs[*l][group];
                     for (n, sign) in [1.0, -1.0].into_iter().enumerate() {
                         let residual = pair.residual[n];
-                        let change: Wide = each(|i| -residual[i] - common[i] - sign * value[i]);
-                        pair.residual[n] = change;
-                        reach.row(&change, &pair.multiplier[n], &pair.inverse[n], target);
+                        let fall: Wide = each(|i| residual[i] + common[i] + sign * value[i]);
+                        pair.residual[n] = fall;
+                        reach.row(&fall, &pair.multiplier[n], &pair.inverse[n], target);
                     }
                 }
             }
             for n in 0..=Self::BOUNDS {
                 let single = &mut rows.singles[n];
                 let residual = single.residual;
-                let change: Wide = if n < Self::BOUNDS {
-                    each(|i| -residual[i] - along[n][i])
+                let fall: Wide = if n < Self::BOUNDS {
+                    each(|i| residual[i] + along[n][i])
                 } else {
-                    each(|i| -residual[i] + along[1][i])
+                    each(|i| residual[i] - along[1][i])
                 };
-                single.residual = change;
-                reach.row(&change, &single.multiplier, &single.inverse, target);
+                single.residual = fall;
+                reach.row(&fall, &single.multiplier, &single.inverse, target);
             }
         }
         reach.lengths()
@@ -618,10 +680,10 @@ struct Reach {
 }
 
 impl Reach {
-    /// Of a row: Δs/s, and that of the multiplier, (target/λ − s − Δs)/s.
+    /// Of a row: −Δs/s, and that of the multiplier, (s + Δs − target/λ)/s.
     #[inline(always)]
-    fn row(&mut self, change: &Wide, multiplier: &Wide, inverse: &Wide, target: f64) {
-        let shrinking: Wide = each(|i| -change[i] * multiplier[i] * inverse[i]);
+    fn row(&mut self, fall: &Wide, multiplier: &Wide, inverse: &Wide, target: f64) {
+        let shrinking: Wide = each(|i| fall[i] * multiplier[i] * inverse[i]);
         self.slack = each(|i| larger(self.slack[i], shrinking[i]));
         self.multiplier =
             each(|i| larger(self.multiplier[i], 1.0 - shrinking[i] - target * inverse[i]));

@@ -1,7 +1,7 @@
 //! The share of the Newton system that three places of an interval have, several intervals at once.
 
 use super::PLACES;
-use crate::lanes::{Lanes, each, larger};
+use crate::lanes::{Lanes, each};
 
 /// Single rows at most: bounds on b from above at each place, and from below at the second.
 pub const MAX_SINGLES: usize = PLACES + 1;
@@ -73,9 +73,8 @@ impl<const L: usize, const GROUPS: usize> Rows<L, GROUPS> {
 #[derive(Clone, Copy, Debug)]
 pub struct Sides {
     pub weight: Wide,
-    /// `weight·b`.
-    pub common: Wide,
-    pub right: Wide,
+    /// `weight·b − right`.
+    pub over: Wide,
 }
 
 /// Hessian (upper triangle by rows) and gradient.
@@ -83,8 +82,6 @@ pub struct Sides {
 pub struct Share {
     pub hessian: [Wide; 6],
     pub gradient: [Wide; 3],
-    /// Largest violation, as a share of the right side.
-    pub violation: Wide,
 }
 
 const AT: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
@@ -139,9 +136,10 @@ impl Share {
         target: f64,
     ) {
         let value = dot(form, beta);
-        let over: Wide = each(|i| place.common[i] - place.right[i]);
-        let over = [each(|i| over[i] + value[i]), each(|i| over[i] - value[i])];
-        self.violation = each(|i| larger(larger(self.violation[i], over[0][i]), over[1][i]));
+        let over = [
+            each(|i| place.over[i] + value[i]),
+            each(|i| place.over[i] - value[i]),
+        ];
         let (d, g) = both(&over, pair, target);
         let plus = [0, 1, 2].map(|n| each(|i| common[n][i] + form[n][i]));
         let minus = [0, 1, 2].map(|n| each(|i| common[n][i] - form[n][i]));
@@ -154,7 +152,6 @@ impl Share {
     pub fn acceleration(&mut self, form: &Form, beta: &[Wide; 3], pair: &mut Pair, target: f64) {
         let value = dot(form, beta);
         let over = [each(|i| value[i] - 1.0), each(|i| -value[i] - 1.0)];
-        self.violation = each(|i| larger(larger(self.violation[i], over[0][i]), over[1][i]));
         let (d, g) = both(&over, pair, target);
         let bend = each(|i| d[0][i] + d[1][i]);
         let slope = each(|i| g[0][i] - g[1][i]);
@@ -171,7 +168,6 @@ impl Share {
         single: &mut Single,
         target: f64,
     ) {
-        self.violation = each(|i| larger(self.violation[i], over[i]));
         let (bend, slope) = row(
             over,
             (&single.slack, &single.multiplier),

@@ -60,6 +60,15 @@ struct Rows<const L: usize> {
     interval: usize,
 }
 
+impl<const L: usize> Rows<L> {
+    /// Where the motion is beside the middle of the box, in half widths.
+    #[inline(always)]
+    fn value(&self, spline: &Spline<L>) -> Lanes<L> {
+        let at = combine(&self.weights, control(spline, self.interval));
+        each(|l| (at[l] - self.point[l]) * self.per_half[l])
+    }
+}
+
 /// Smooths; keeps its memory from one time to the next.
 #[derive(Debug)]
 pub struct Smoother<const L: usize> {
@@ -116,12 +125,16 @@ impl<const L: usize> Smoother<L> {
             violation: f64::INFINITY,
         };
         loop {
-            let target = each(|l| larger(shrink[l] * gap[l], FLOOR * ENOUGH));
-            status.violation = self.assemble(spline, &target);
-            let good = largest(&gap) < ENOUGH && status.violation < FEASIBLE;
-            if good || status.iterations == ITERATIONS {
-                return status;
+            let over = status.iterations == ITERATIONS;
+            // How far boxes are missed counts only where nothing is left but them.
+            if largest(&gap) < ENOUGH || over {
+                status.violation = self.violation(spline);
+                if over || status.violation < FEASIBLE {
+                    return status;
+                }
             }
+            let target = each(|l| larger(shrink[l] * gap[l], FLOOR * ENOUGH));
+            self.assemble(spline, &target);
             let free = 3..spline.points.len() - 3;
             banded::solve(&mut self.matrix[free.clone()], &mut self.step[free]);
             let length;
@@ -179,9 +192,20 @@ impl<const L: usize> Smoother<L> {
         each(|l| sum[l] * per)
     }
 
-    /// The Newton system; gives the largest violation.
+    /// The largest violation of a box.
     #[inline(always)]
-    fn assemble(&mut self, spline: &Spline<L>, target: &Lanes<L>) -> f64 {
+    fn violation(&self, spline: &Spline<L>) -> f64 {
+        let mut most = [0.0; L];
+        for row in &self.rows {
+            let value = row.value(spline);
+            most = each(|l| larger(most[l], value[l].abs() - 1.0));
+        }
+        largest(&most)
+    }
+
+    /// The Newton system.
+    #[inline(always)]
+    fn assemble(&mut self, spline: &Spline<L>, target: &Lanes<L>) {
         let count = spline.points.len();
         self.matrix.clear();
         self.matrix.resize(count, Row::ZERO);
@@ -190,11 +214,8 @@ impl<const L: usize> Smoother<L> {
         for k in 0..spline.intervals() {
             self.assemble_jerk(k, control(spline, k));
         }
-        let mut violation = [0.0; L];
         for row in &mut self.rows {
-            let value = combine(&row.weights, control(spline, row.interval));
-            let value: Lanes<L> = each(|l| (value[l] - row.point[l]) * row.per_half[l]);
-            violation = each(|l| larger(violation[l], value[l].abs() - 1.0));
+            let value = row.value(spline);
             let mut weight = [0.0; L];
             let mut slope = [0.0; L];
             for (n, sign) in [1.0, -1.0].into_iter().enumerate() {
@@ -224,7 +245,6 @@ impl<const L: usize> Smoother<L> {
                 *entry = each(|l| entry[l] - wi * slope[l]);
             }
         }
-        largest(&violation)
     }
 
     /// What the jerk of interval `k` adds: its form is (−1, 3, −3, 1).
@@ -268,11 +288,11 @@ impl<const L: usize> Smoother<L> {
             let along = combine(&row.weights, steps);
             for (n, sign) in [1.0, -1.0].into_iter().enumerate() {
                 let multiplier = &row.multiplier[n];
-                row.residual[n] = each(|l| -row.residual[n][l] - sign * along[l] * row.per_half[l]);
-                let change = &row.residual[n];
-                // Changes over themselves: Δs/s, and that of the multiplier, (target/λ − s − Δs)/s.
+                row.residual[n] = each(|l| row.residual[n][l] + sign * along[l] * row.per_half[l]);
+                let fall = &row.residual[n];
+                // Falls over what falls: −Δs/s, and that of the multiplier, (s + Δs − target/λ)/s.
                 let inverse = &row.inverse[n];
-                let shrinking: Lanes<L> = each(|l| -change[l] * multiplier[l] * inverse[l]);
+                let shrinking: Lanes<L> = each(|l| fall[l] * multiplier[l] * inverse[l]);
                 most = each(|l| larger(most[l], shrinking[l]));
                 max_back =
                     each(|l| larger(max_back[l], 1.0 - shrinking[l] - target[l] * inverse[l]));
@@ -285,14 +305,14 @@ impl<const L: usize> Smoother<L> {
             for n in 0..2 {
                 let slack = row.slack[n];
                 let multiplier = row.multiplier[n];
-                let change = row.residual[n];
-                let new_slack: Lanes<L> = each(|l| slack[l] + length[l] * change[l]);
+                let fall = row.residual[n];
+                let new_slack: Lanes<L> = each(|l| slack[l] - length[l] * fall[l]);
                 let inverse = &row.inverse[n];
                 // Δλ = (target − λ·(s + Δs))/s.
                 let new_multiplier: Lanes<L> = each(|l| {
                     let per_slack = multiplier[l] * inverse[l];
                     multiplier[l]
-                        + back[l] * (target[l] - multiplier[l] * (slack[l] + change[l])) * per_slack
+                        + back[l] * (target[l] - multiplier[l] * (slack[l] - fall[l])) * per_slack
                 });
                 products = each(|l| products[l] + new_slack[l] * new_multiplier[l]);
                 (row.slack[n], row.multiplier[n]) = (new_slack, new_multiplier);

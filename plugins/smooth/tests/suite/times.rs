@@ -101,6 +101,17 @@ fn rounds_before_the_last_take_a_coarser_grid_except_where_it_is_short() {
     }
 }
 
+/// The way of a spiral takes 20 s at its feed, and its start and end a quarter of a second more. A raster turns round in every window.
+#[test]
+fn windows_that_go_at_their_feed_take_one_round_and_others_their_two() {
+    let (peaks, effort) = drive("spiral", &Options::default());
+    let of_first = 2 * u64::from(Options::default().rounds);
+    assert!(effort.rounds < effort.windows + of_first, "{effort:?}");
+    assert!(peaks.time_s < 20.3, "{peaks:?}");
+    let (_, effort) = drive("raster", &Options::default());
+    assert!(effort.rounds >= 2 * effort.windows, "{effort:?}");
+}
+
 /// On an arc whose tolerance is far below what the grid can follow no window passes but a short one. It is looked for by halving the
 /// first; afterwards as long ones as that one are planned.
 #[test]
