@@ -91,6 +91,10 @@ impl Numbers {
 
 /// Age of what is reported of each joint, fine periods; 0 where there is no such joint. Fine loop.
 pub fn ages(feedback: &Feedback, joints: usize) -> [u32; MAX_AXES] {
+    // What is true nearly always is looked at first.
+    if feedback.age_periods == [0; MAX_AXES] {
+        return [0; MAX_AXES];
+    }
     // As many steps as there are joints at most: to copy a part of an array is a call.
     std::array::from_fn(|joint| {
         if joint < joints {

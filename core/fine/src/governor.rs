@@ -114,7 +114,7 @@ use tandem_sdk::{AxisLimits, MAX_AXES};
 use crate::period_points::PeriodPoints;
 
 /// Relative tolerance within which a plan is at its limit, not beyond it.
-const TOLERANCE: f64 = 1e-6;
+pub const TOLERANCE: f64 = 1e-6;
 
 /// Where the rate is to go in the coming period.
 #[derive(Clone, Copy, Debug)]

@@ -41,6 +41,7 @@ struct AxisBounds {
     fastest_mm_per_s: f64,
     /// Change of velocity beyond that.
     allowed_mm_per_s: f64,
+    most_jerk_mm_per_s3: f64,
 }
 
 /// Velocity and acceleration with which a sample was reached, as the differences of samples show it.
@@ -59,6 +60,23 @@ impl LastMotion {
         acceleration: AxisVector::ZERO,
         buckets: [[0.0; MAX_AXES]; 2],
     };
+
+    /// Whether `axis` stood in this period and the one before, and no earlier change of its velocity still counts.
+    #[inline]
+    fn rests(&self, axis: usize) -> bool {
+        let [up, down] = &self.buckets;
+        self.velocity[axis] == 0.0
+            && self.acceleration[axis] == 0.0
+            && up[axis] == 0.0
+            && down[axis] == 0.0
+    }
+
+    /// It stands once more.
+    #[inline]
+    fn rest(&mut self, axis: usize) {
+        (self.velocity[axis], self.acceleration[axis]) = (0.0, 0.0);
+        (self.buckets[0][axis], self.buckets[1][axis]) = (0.0, 0.0);
+    }
 }
 
 /// What was found of a sample.
@@ -82,6 +100,8 @@ impl Guard {
                 fastest_mm_per_s: limits.feed_mm_per_s.max(limits.rapid_mm_per_s)
                     * (1.0 + TOLERANCE),
                 allowed_mm_per_s: config.speed_difference_mm_per_s[axis] * (1.0 + TOLERANCE),
+                most_jerk_mm_per_s3: config.limits.axes[axis].jerk_mm_per_s3
+                    * (1.0 + JERK_TOLERANCE),
             }
         });
         Self {
@@ -129,13 +149,28 @@ impl Guard {
 
     /// Judges `next` as the sample after the last one sent; the travel of the axes `unhomed`, a bit each, does not count.
     pub fn check(&mut self, next: &AxisVector, unhomed: u32) -> Checked {
+        let [first, second] = &mut self.last_motions;
+        let (last, now) = if self.sent == 0 {
+            (&*first, second)
+        } else {
+            (&*second, first)
+        };
+        let mut judge = Judge {
+            config: &self.config,
+            bounds: &self.bounds,
+            position: &self.position,
+            last,
+            now,
+            relaxes: self.relaxed > 0,
+        };
         let mut checked = Checked {
             relaxed: false,
             breach: None,
         };
-        for axis in 0..self.config.lane_count() {
+        // No more than there are, and the compiler sees it.
+        for axis in 0..self.config.lane_count().min(MAX_AXES) {
             let travels = unhomed >> axis & 1 == 0;
-            let breach = self.check_axis(axis, next[axis], travels, &mut checked.relaxed);
+            let breach = judge.check_axis(axis, next[axis], travels, &mut checked.relaxed);
             if checked.breach.is_none() && breach.is_some() {
                 checked.breach = breach;
             }
@@ -149,7 +184,22 @@ impl Guard {
         self.sent = 1 - self.sent;
         self.relaxed = self.relaxed.saturating_sub(1);
     }
+}
 
+/// A sample that is judged, against the one sent last.
+struct Judge<'a> {
+    config: &'a FineConfig,
+    bounds: &'a [AxisBounds; MAX_AXES],
+    /// The last position sent.
+    position: &'a AxisVector,
+    last: &'a LastMotion,
+    /// The motion with the sample.
+    now: &'a mut LastMotion,
+    /// Jerk beyond its limit is not held against it.
+    relaxes: bool,
+}
+
+impl Judge<'_> {
     #[inline]
     fn check_axis(
         &mut self,
@@ -161,12 +211,12 @@ impl Guard {
         let bounds = &self.bounds[axis];
         let period_s = self.config.period_s;
         let at = self.position[axis];
-        let [first, second] = &mut self.last_motions;
-        let (last, now) = if self.sent == 0 {
-            (first, second)
-        } else {
-            (second, first)
-        };
+        let (last, now) = (self.last, &mut *self.now);
+        // What stands where it stood breaks nothing, and leaves nothing behind.
+        if next == at && last.rests(axis) {
+            now.rest(axis);
+            return None;
+        }
         // Each velocity is a difference of two positions that are known to half a unit in the last place.
         let rounding = rounding(next, period_s);
         let velocity = (next - at) / period_s;
@@ -238,7 +288,7 @@ impl Guard {
                 limits.feed_mm_per_s.max(limits.rapid_mm_per_s),
             );
         }
-        let buckets = &self.last_motions[1 - self.sent].buckets;
+        let buckets = &self.now.buckets;
         if larger(buckets[0][axis], buckets[1][axis]) > bounds.allowed_mm_per_s + rounding {
             return breach(
                 Breach::Acceleration,
@@ -250,6 +300,7 @@ impl Guard {
     }
 
     /// Jerk, where the planner keeps it.
+    #[inline]
     fn check_jerk(
         &mut self,
         axis: usize,
@@ -257,18 +308,17 @@ impl Guard {
         rounding: f64,
         relaxed: &mut bool,
     ) -> Option<FaultKind> {
-        let limit = self.config.limits.axes[axis].jerk_mm_per_s3;
         let period_s = self.config.period_s;
-        self.last_motions[1 - self.sent].acceleration[axis] = acceleration;
-        let value = (acceleration - self.last_motions[self.sent].acceleration[axis]) / period_s;
-        let beyond =
-            value.abs() > limit * (1.0 + JERK_TOLERANCE) + 4.0 * rounding / (period_s * period_s);
-        *relaxed |= beyond && self.relaxed > 0;
-        (beyond && self.relaxed == 0).then_some(FaultKind::Guard {
+        self.now.acceleration[axis] = acceleration;
+        let value = (acceleration - self.last.acceleration[axis]) / period_s;
+        let most = self.bounds[axis].most_jerk_mm_per_s3;
+        let beyond = value.abs() > most + 4.0 * rounding / (period_s * period_s);
+        *relaxed |= beyond && self.relaxes;
+        (beyond && !self.relaxes).then(|| FaultKind::Guard {
             breach: Breach::Jerk,
             axis,
             value,
-            limit,
+            limit: self.config.limits.axes[axis].jerk_mm_per_s3,
         })
     }
 }
@@ -341,6 +391,17 @@ mod tests {
                     None
                 );
             }
+        }
+    }
+
+    /// What an axis has changed its speed by counts while it stands, and less with each period.
+    #[test]
+    fn an_axis_that_stands_has_its_steps_back_after_a_while() {
+        for axis in 0..3 {
+            assert!(breach(axis, &[3.0, 0.0, 0.0, -3.0]).is_some());
+            assert_eq!(breach(axis, &[3.0, 0.0, 0.0, 0.0, -3.0]), None);
+            assert_eq!(breach(axis, &[0.0, 0.0, 3.0]), None);
+            assert!(breach(axis, &[0.0, 0.0, 3.003]).is_some());
         }
     }
 

@@ -2,7 +2,31 @@
 
 use tandem_sdk::{AxisLimits, MAX_AXES, Segment, SegmentFlags, derivatives};
 
-use crate::plan_ahead::{Ahead, LOOK_ENTRIES};
+use crate::governor::TOLERANCE;
+use crate::plan_ahead::{Ahead, LOOK_ENTRIES, Piece};
+
+/// Segments that something is known of at the same time: more than a period passes of all but the shortest.
+const KNOWN: usize = 4;
+
+/// What is known of a whole segment.
+#[derive(Clone, Copy, Debug)]
+struct Known {
+    /// Number of its entry.
+    number: u64,
+    /// Points of a stretch of it.
+    points: usize,
+    /// It keeps velocity and acceleration wherever it is looked at.
+    keeps_limits: bool,
+}
+
+impl Known {
+    /// Of no segment.
+    const NOTHING: Self = Self {
+        number: u64::MAX,
+        points: 0,
+        keeps_limits: false,
+    };
+}
 
 /// One point of the plan, per axis and per s of program time.
 #[derive(Clone, Copy, Debug, Default)]
@@ -24,9 +48,11 @@ pub struct PeriodPoints {
     axes: usize,
     /// The points themselves are kept, and not only what they are of the limits.
     keeps_points: bool,
-    /// Largest |velocity| / limit.
+    /// Each at its number modulo their count; only where no points are kept.
+    known: [Known; KNOWN],
+    /// Largest |velocity| / limit. Where no points are kept, of segments that may be beyond their limits only.
     pub speed_ratio: f64,
-    /// Largest |acceleration| / limit.
+    /// Largest |acceleration| / limit, in the same way.
     pub acceleration_ratio: f64,
     /// Program time that the points cover, s.
     pub covered_s: f64,
@@ -41,6 +67,7 @@ impl PeriodPoints {
         Self {
             list,
             keeps_points: true,
+            known: [Known::NOTHING; KNOWN],
             count: 0,
             per_acceleration: limits.map(|l| 1.0 / l.acceleration_mm_per_s2),
             per_speed: [
@@ -82,7 +109,10 @@ impl PeriodPoints {
                 break;
             }
             let duration_s = piece.duration_s();
-            self.add(piece.segment, piece.from_s, duration_s.min(left_s));
+            let stretch_s = duration_s.min(left_s);
+            if !self.passes(&piece, stretch_s) {
+                self.add(piece.segment, piece.from_s, stretch_s);
+            }
             left_s -= duration_s;
             if piece.ends_at_rest() {
                 // At a wall behind which only a rest without duration has come, no time leads there: but it is to be reached.
@@ -106,13 +136,55 @@ impl PeriodPoints {
         self.list[..self.count].iter()
     }
 
+    /// Passes a stretch of a segment that is known to keep its limits, where nobody asks for more than that.
+    #[inline]
+    fn passes(&mut self, piece: &Piece<'_>, duration_s: f64) -> bool {
+        if self.keeps_points {
+            return false;
+        }
+        let place = piece.number as usize % KNOWN;
+        if self.known[place].number != piece.number {
+            self.known[place] = self.known_of(piece);
+        }
+        let known = &self.known[place];
+        if known.keeps_limits {
+            self.count += if duration_s == 0.0 { 1 } else { known.points };
+            self.covered_s += duration_s;
+        }
+        known.keeps_limits
+    }
+
+    fn known_of(&self, piece: &Piece<'_>) -> Known {
+        let segment = piece.segment;
+        let per_speed = &self.per_speed[usize::from(segment.flags.contains(SegmentFlags::RAPID))];
+        // Far more is left of the tolerance than what points of a segment are off by rounding.
+        let most = 1.0 + TOLERANCE / 2.0;
+        let keeps = |axis: usize| {
+            let (c, takeback) = (&segment.coefficients[axis], segment.step_acceleration[axis]);
+            let [speed, acceleration] = bounds(c, takeback, segment.duration_s);
+            speed * per_speed[axis] <= most && acceleration * self.per_acceleration[axis] <= most
+        };
+        Known {
+            number: piece.number,
+            points: 2 + usize::from(self.is_curved(segment)),
+            keeps_limits: (0..self.axes).all(keeps),
+        }
+    }
+
+    /// Whether some axis of `segment` jerks.
+    fn is_curved(&self, segment: &Segment) -> bool {
+        segment.coefficients[..self.axes]
+            .iter()
+            .any(|c| c[3] != 0.0)
+    }
+
     /// Adds a stretch of `segment`: its ends, and the middle where the segment is curved; one point where that is all it is.
     pub fn add(&mut self, segment: &Segment, from_s: f64, duration_s: f64) {
         let (to_s, middle_s) = (from_s + duration_s, from_s + duration_s / 2.0);
         // One stands for another where there are fewer.
         let (count, times) = if duration_s == 0.0 {
             (1, [from_s; 3])
-        } else if (0..self.axes).any(|axis| segment.coefficients[axis][3] != 0.0) {
+        } else if self.is_curved(segment) {
             (3, [from_s, to_s, middle_s])
         } else {
             (2, [from_s, to_s, to_s])
@@ -158,6 +230,16 @@ impl PeriodPoints {
     }
 }
 
+/// Bounds on |velocity| and |acceleration| of an axis with the coefficients `c` from 0 to `t`, with a step that is taken back at
+/// `takeback`: as if all that changes them pulled in one direction.
+fn bounds(c: &[f64; 6], takeback: f64, t: f64) -> [f64; 2] {
+    let [_, c1, c2, c3, c4, c5] = c.map(f64::abs);
+    [
+        c1 + t * (2.0 * c2 + t * (3.0 * c3 + t * (4.0 * c4 + t * (5.0 * c5)))),
+        2.0 * c2 + takeback.abs() + t * (6.0 * c3 + t * (12.0 * c4 + t * (20.0 * c5))),
+    ]
+}
+
 /// The larger of two numbers of which the first is one: one instruction, where `f64::max` also looks for NaN there.
 pub fn larger(most: f64, value: f64) -> f64 {
     if value > most { value } else { most }
@@ -167,6 +249,7 @@ pub fn larger(most: f64, value: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::cursor::Cursor;
+    use crate::governor::Governor;
     use rtrb::RingBuffer;
     use tandem_rings::Queued;
     use tandem_sdk::{AxisVector, SegmentFlags};
@@ -285,5 +368,49 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// The next of a row of numbers from -1 to 1.
+    fn next_of(seed: &mut u64) -> f64 {
+        *seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        (*seed >> 40) as f64 / f64::from(1 << 23) - 1.0
+    }
+
+    /// Segments about their limits, some within and some beyond: whether points are kept or not, the highest rate at which the plan
+    /// keeps its limits is the same, and most segments that keep them are known to.
+    #[test]
+    fn what_is_known_of_segments_leaves_the_limit_of_the_plan_as_it_is() {
+        let limits = [AxisLimits {
+            feed_mm_per_s: 10.0,
+            rapid_mm_per_s: 12.0,
+            acceleration_mm_per_s2: 200.0,
+            ..AxisLimits::unlimited()
+        }; MAX_AXES];
+        let (mut seed, mut within, mut known) = (1, 0, 0);
+        for _ in 0..200 {
+            let mut exact = PeriodPoints::new(&limits, 2);
+            let mut quick = PeriodPoints::new(&limits, 2).without_points();
+            let mut segment = Segment::rest(&AxisVector::ZERO, 0.01);
+            segment.flags = [SegmentFlags::default(), SegmentFlags::RAPID]
+                [usize::from(next_of(&mut seed) > 0.0)];
+            for c in &mut segment.coefficients {
+                *c = [0.0, 12.0, 110.0, 1e3, 2e4, 5e5].map(|most| most * next_of(&mut seed));
+            }
+            segment.step_acceleration[1] = 20.0 * next_of(&mut seed);
+            let ahead = Ahead::new(&segment, Some(0.0), 1, None);
+            exact.fill(&ahead, 0.01);
+            quick.fill(&ahead, 0.01);
+            assert_eq!(
+                Governor::plan_limit(&exact),
+                Governor::plan_limit(&quick),
+                "{segment:?}"
+            );
+            assert_eq!(exact.count, quick.count);
+            assert_eq!(exact.covered_s, quick.covered_s);
+            within += u32::from(Governor::plan_limit(&exact) == 1.0);
+            known += u32::from(quick.known[0].keeps_limits);
+        }
+        assert!((50..150).contains(&within), "{within}");
+        assert!(known > within / 2, "{known} of {within}");
     }
 }

@@ -30,6 +30,8 @@ pub struct Ahead<'a> {
 /// A piece of the plan ahead: what is left of a segment.
 #[derive(Clone, Copy, Debug)]
 pub struct Piece<'a> {
+    /// Number of the segment's entry, counted from the start: no other segment has it.
+    pub number: u64,
     /// The segment.
     pub segment: &'a Segment,
     /// Where the piece begins in it, s; it ends where the segment does.
@@ -55,6 +57,8 @@ impl Piece<'_> {
 /// The pieces of the plan ahead, nearest first.
 #[derive(Debug)]
 pub struct Pieces<'a> {
+    /// Number of the entry that was looked at last.
+    number: u64,
     here: Option<(&'a Segment, f64)>,
     first: Iter<'a, Queued>,
     second: Iter<'a, Queued>,
@@ -74,13 +78,16 @@ impl<'a> Iterator for Pieces<'a> {
         let (segment, from_s) = match self.here.take() {
             Some(here) => here,
             None => loop {
-                match self.first.next().or_else(|| self.second.next())? {
+                let queued = self.first.next().or_else(|| self.second.next())?;
+                self.number = self.number.wrapping_add(1);
+                match queued {
                     Queued::Segment { segment, .. } => break (segment, 0.0),
                     Queued::Event(_) => {}
                 }
             },
         };
         let piece = Piece {
+            number: self.number,
             segment,
             from_s,
             offset_s: self.offset_s,
@@ -117,6 +124,8 @@ impl<'a> Ahead<'a> {
     pub fn pieces(&self) -> Pieces<'_> {
         let [first, second] = self.at_most(LOOK_ENTRIES);
         Pieces {
+            // The entry taken out last is the segment that moves, or an event behind it: then nobody else has that number either.
+            number: self.first.wrapping_sub(1),
             here: self.local_s.map(|local_s| (self.segment, local_s)),
             first: first.iter(),
             second: second.iter(),

@@ -113,6 +113,36 @@ impl BlockTimes {
         let mut left_s = if self.started { self.period_s } else { 0.0 };
         self.started = true;
         let asked = self.asked(sample);
+        // Most samples leave none behind.
+        if self
+            .open
+            .front()
+            .is_some_and(|open| open.index < sample.block)
+        {
+            left_s = self.leave_behind(sample, left_s, asked, &mut part, &mut passed);
+        }
+        match self
+            .open
+            .front_mut()
+            .filter(|open| open.index == sample.block)
+        {
+            Some(open) => {
+                open.time_s += left_s;
+                part(asked.unwrap_or(open.goes_to), left_s);
+            }
+            None => part(asked.unwrap_or(TimeGoesTo::Unreported), left_s),
+        }
+    }
+
+    /// Forgets the blocks that lie behind that of `sample`, in whose period `left_s` passed; gives what is left of that for its own.
+    fn leave_behind(
+        &mut self,
+        sample: &Sample,
+        mut left_s: f64,
+        asked: Option<TimeGoesTo>,
+        part: &mut impl FnMut(TimeGoesTo, f64),
+        passed: &mut impl FnMut(u64, f64),
+    ) -> f64 {
         // They are few: each sample forgets those that it has left behind.
         let behind = self.open.iter();
         let here = behind.take_while(|open| open.index < sample.block).count();
@@ -135,17 +165,7 @@ impl BlockTimes {
             }
             passed(open.index, open.time_s);
         }
-        match self
-            .open
-            .front_mut()
-            .filter(|open| open.index == sample.block)
-        {
-            Some(open) => {
-                open.time_s += left_s;
-                part(asked.unwrap_or(open.goes_to), left_s);
-            }
-            None => part(asked.unwrap_or(TimeGoesTo::Unreported), left_s),
-        }
+        left_s
     }
 
     /// Nothing follows: `passed` is told of the blocks that are left, in order.

@@ -150,17 +150,22 @@ impl Monitor {
     /// How each axis has moved up to `sample`.
     fn look_at_motion(&mut self, sample: &Sample) {
         let per_s = 1.0 / self.period_s;
+        let [velocities, accelerations, jerks] = &mut self.peaks;
         let each = self.last[..self.axes.count()].iter_mut();
         for (axis, (last, position)) in each.zip(&sample.command.0).enumerate() {
+            // Where an axis stood and goes on standing, nothing gets larger.
+            if *position == last[0] && last[1..] == [0.0; 2] && self.worst.is_settled(axis) {
+                continue;
+            }
             let velocity = (position - last[0]) * per_s;
             let acceleration = (velocity - last[1]) * per_s;
             let jerk = (acceleration - last[2]) * per_s;
             *last = [*position, velocity, acceleration];
-            let motion = [velocity, acceleration, jerk];
-            for (peak, now) in self.peaks.iter_mut().zip(motion) {
-                peak[axis] = larger(peak[axis], now.abs());
-            }
-            self.worst.sample(axis, motion, sample);
+            velocities[axis] = larger(velocities[axis], velocity.abs());
+            accelerations[axis] = larger(accelerations[axis], acceleration.abs());
+            jerks[axis] = larger(jerks[axis], jerk.abs());
+            self.worst
+                .sample(axis, [velocity, acceleration, jerk], sample);
         }
     }
 }

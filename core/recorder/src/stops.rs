@@ -34,10 +34,13 @@ pub struct Stop {
 pub struct StopWatch {
     axes: Axes,
     period_s: f64,
-    /// Position and rate of program time of the last sample.
-    last: Option<(AxisVector, f64)>,
-    /// What it moved by.
-    way: AxisVector,
+    /// A sample has been seen.
+    started: bool,
+    /// Positions of the last two samples, and which of them is the last.
+    places: [AxisVector; 2],
+    last: usize,
+    /// Rate of program time of the last one.
+    sigma: f64,
     cause: StopCause,
     /// The last stop has not come to rest.
     open: bool,
@@ -57,8 +60,10 @@ impl StopWatch {
         Self {
             axes,
             period_s,
-            last: None,
-            way: AxisVector::ZERO,
+            started: false,
+            places: [AxisVector::ZERO; 2],
+            last: 0,
+            sigma: 1.0,
             cause,
             open: false,
             before,
@@ -69,9 +74,10 @@ impl StopWatch {
 
     /// A sample was sent.
     pub fn sample(&mut self, sample: &Sample) {
-        let way = self
-            .last
-            .map_or(AxisVector::ZERO, |(last, _)| sample.command - last);
+        if !self.started {
+            self.started = true;
+            self.places = [sample.command; 2];
+        }
         if sample.cause != self.cause {
             self.open = false;
             if sample.cause != StopCause::None {
@@ -79,10 +85,13 @@ impl StopWatch {
             }
         }
         if self.open {
+            let way = sample.command - self.places[self.last];
             self.go_on(sample, self.length_mm(&way));
         }
-        (self.cause, self.way, self.last) =
-            (sample.cause, way, Some((sample.command, sample.sigma)));
+        self.cause = sample.cause;
+        self.sigma = sample.sigma;
+        self.last = 1 - self.last;
+        self.places[self.last] = sample.command;
     }
 
     fn begin(&mut self, sample: &Sample) {
@@ -91,8 +100,9 @@ impl StopWatch {
             return;
         }
         self.open = true;
-        let speed_mm_per_s = self.length_mm(&self.way) / self.period_s;
-        self.before = (self.last.map_or(1.0, |(_, sigma)| sigma), speed_mm_per_s);
+        let way = self.places[self.last] - self.places[1 - self.last];
+        let speed_mm_per_s = self.length_mm(&way) / self.period_s;
+        self.before = (self.sigma, speed_mm_per_s);
         let (cause, reaction_periods) = (sample.cause.name(), None);
         let (tick, line) = (sample.tick, sample.line);
         self.stops.push(Stop {

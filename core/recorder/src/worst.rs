@@ -57,6 +57,12 @@ impl Worst {
         self.axes[axis].sample(motion, self.period_s, sample);
     }
 
+    /// Whether no earlier change of the velocity of `axis` counts any more.
+    #[inline]
+    pub fn is_settled(&self, axis: usize) -> bool {
+        self.axes[axis].beyond == [0.0; 2]
+    }
+
     /// What was worst of the limits of `axis`.
     pub fn of_axis(&self, axis: usize) -> OfLimits {
         self.axes[axis].of_limits

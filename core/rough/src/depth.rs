@@ -46,7 +46,7 @@
 
 use std::collections::VecDeque;
 
-use crate::easing::{EASED, Easing};
+use crate::easing::{EASED, Easing, PathMotion};
 use crate::window::SlidingMax;
 use tandem_rings::{STOP_JERK_SHARE, STOP_SHARE, max_entries_a_period};
 use tandem_sdk::{Segment, SegmentFlags};
@@ -180,8 +180,9 @@ impl QueueDepth {
             self.braking.push(Braking::WHOLE_STOP, until_s);
             return;
         }
-        let at = |share: f64| segment.path_speed_mm_per_s(share * segment.duration_s);
-        let speed = at(0.0).max(at(0.5)).max(at(1.0));
+        let along = PathMotion::at(segment);
+        let [first, middle, end] = along.speeds_mm_per_s;
+        let speed = first.max(middle).max(end);
         self.decelerations
             .push(-segment.stop_deceleration_mm_per_s2, until_s);
         let stop_s =
@@ -203,7 +204,7 @@ impl QueueDepth {
         if ramp_s > 0.0 {
             self.ramps.push(ramp_s, until_s);
         }
-        let easing_s = self.easing.longest_s(segment);
+        let easing_s = self.easing.longest_s(segment, &along);
         if easing_s > 0.0 {
             self.easings.push(easing_s, until_s);
         }

@@ -25,29 +25,63 @@ pub const EASED: f64 = 0.2;
 pub struct Easing {
     /// mm/s³; infinite where none is kept.
     jerk_mm_per_s3: [f64; MAX_AXES],
+    /// No axis from this one on keeps any.
+    lanes: usize,
+}
+
+/// How a segment moves along its path where stops in it are looked at: at its beginning, in its middle and at its end.
+#[derive(Clone, Copy, Debug)]
+pub struct PathMotion {
+    /// Local time of the middle and the end, s.
+    times_s: [f64; 2],
+    /// Path speeds, mm/s.
+    pub speeds_mm_per_s: [f64; 3],
+    /// Third derivatives of the path coordinate, mm/s³.
+    jerks_mm_per_s3: [f64; 3],
+}
+
+impl PathMotion {
+    /// At `segment`.
+    #[inline]
+    pub fn at(segment: &Segment) -> Self {
+        let [middle_s, end_s] = [0.5 * segment.duration_s, segment.duration_s];
+        let path = &segment.path;
+        let [middle, _, middle_jerk] = derivatives(path, middle_s);
+        let [end, _, end_jerk] = derivatives(path, end_s);
+        Self {
+            times_s: [middle_s, end_s],
+            // At the start they are coefficients.
+            speeds_mm_per_s: [path[1], middle, end],
+            jerks_mm_per_s3: [6.0 * path[3], middle_jerk, end_jerk],
+        }
+    }
 }
 
 impl Easing {
     /// No limits: a stop begins at once.
     pub const NONE: Self = Self {
         jerk_mm_per_s3: [f64::INFINITY; MAX_AXES],
+        lanes: 0,
     };
 
     /// Makes a stop keep the jerk limit of `axis`, mm/s³. Host.
     pub fn count(&mut self, axis: usize, jerk_mm_per_s3: f64) {
         self.jerk_mm_per_s3[axis] = jerk_mm_per_s3;
+        self.lanes = self.lanes.max(axis + 1);
     }
 
-    /// Longest time in which a stop in `segment` begins, beyond what any stop takes, s. Zero for plans that keep no jerk limit.
-    /// Rough loop; does not allocate.
-    pub fn longest_s(&self, segment: &Segment) -> f64 {
+    /// Longest time in which a stop in `segment`, which moves so `along` its path, begins, beyond what any stop takes, s. Zero for plans
+    /// that keep no jerk limit. Rough loop; does not allocate.
+    pub fn longest_s(&self, segment: &Segment, along: &PathMotion) -> f64 {
         if segment.order < 3 {
             return 0.0;
         }
-        let times = [0.0, 0.5, 1.0].map(|share| share * segment.duration_s);
         let [mut whole, mut left] = [[f64::INFINITY; 3]; 2];
-        let lanes = segment.coefficients.iter().zip(&self.jerk_mm_per_s3);
-        for (c, limit) in lanes.filter(|(_, limit)| limit.is_finite()) {
+        let lanes = segment.coefficients[..self.lanes].iter();
+        for (c, limit) in lanes.zip(&self.jerk_mm_per_s3) {
+            if !limit.is_finite() || c[1..] == [0.0; 5] {
+                continue;
+            }
             let mut look = |n: usize, [velocity, _, jerk]: [f64; 3]| {
                 if velocity != 0.0 {
                     whole[n] = smaller(whole[n], limit / velocity.abs());
@@ -57,24 +91,23 @@ impl Easing {
             };
             // At the start they are coefficients.
             look(0, [c[1], 2.0 * c[2], 6.0 * c[3]]);
-            look(1, derivatives(c, times[1]));
-            look(2, derivatives(c, times[2]));
+            look(1, derivatives(c, along.times_s[0]));
+            look(2, derivatives(c, along.times_s[1]));
         }
-        let at = |n: usize| begins_s(segment, times[n], left[n], whole[n]);
+        let at = |n: usize| {
+            let [speed, jerk] = [along.speeds_mm_per_s[n], along.jerks_mm_per_s3[n]];
+            begins_s(speed, jerk, left[n], whole[n])
+        };
         [0, 1, 2].map(at).into_iter().fold(0.0, f64::max)
     }
 }
 
-/// How long a stop takes to begin at the local time `t_s` of `segment`, s, beyond what any stop takes, where the jerk limits are worth
-/// `whole` of the rate's second derivative, 1/s², and the plan leaves `left` of it. What the plan itself brakes with along the path need
-/// not be left.
-fn begins_s(segment: &Segment, t_s: f64, left: f64, whole: f64) -> f64 {
+/// How long a stop takes to begin where the path coordinate has this `speed`, mm/s, and `path_jerk`, mm/s³, beyond what any stop takes,
+/// s, where the jerk limits are worth `whole` of the rate's second derivative, 1/s², and the plan leaves `left` of it. What the plan
+/// itself brakes with along the path need not be left.
+fn begins_s(speed: f64, path_jerk: f64, left: f64, whole: f64) -> f64 {
     // Nothing of the limits is used against the motion, or nothing moves.
-    if left >= whole {
-        return 0.0;
-    }
-    let [speed, _, path_jerk] = derivatives(&segment.path, t_s);
-    if speed <= 0.0 {
+    if left >= whole || speed <= 0.0 {
         return 0.0;
     }
     let brakes = (-path_jerk / speed).max(0.0);
@@ -103,6 +136,10 @@ mod tests {
 
     /// The limit of both axes, mm/s³.
     const JERK: f64 = 20_000.0;
+
+    fn longest_s(easing: Easing, segment: &Segment) -> f64 {
+        easing.longest_s(segment, &PathMotion::at(segment))
+    }
 
     fn limits() -> Easing {
         let mut easing = Easing::NONE;
@@ -139,7 +176,7 @@ mod tests {
         for (radius, speed) in [(0.65, 20.0), (0.7, 20.0), (0.9, 20.0), (5.0, 80.0)] {
             let (whole, used) = (JERK / speed, speed.powi(3) / (radius * radius) / JERK);
             let expected = to_eased_s(used.min(1.0), whole) - to_eased_s(0.0, whole);
-            let easing = limits().longest_s(&turn(radius, speed));
+            let easing = longest_s(limits(), &turn(radius, speed));
             assert!(
                 (0.96..1.05).contains(&(easing / expected)),
                 "{radius} mm at {speed} mm/s: {easing} s, not {expected} s"
@@ -150,17 +187,17 @@ mod tests {
     #[test]
     fn a_plan_that_goes_straight_on_or_brakes_itself_puts_no_stop_off() {
         let straight = turn(1e9, 20.0);
-        assert!(limits().longest_s(&straight) < 1e-6);
+        assert!(longest_s(limits(), &straight) < 1e-6);
         let mut brakes = straight;
         for c in [&mut brakes.coefficients[0], &mut brakes.path] {
             c[3] = -JERK / 6.0;
         }
-        assert_eq!(limits().longest_s(&brakes), 0.0);
+        assert_eq!(longest_s(limits(), &brakes), 0.0);
         let circle = Segment {
             order: 2,
             ..turn(0.6, 20.0)
         };
-        assert_eq!(limits().longest_s(&circle), 0.0, "no jerk limit is kept");
-        assert_eq!(Easing::NONE.longest_s(&turn(0.6, 20.0)), 0.0);
+        assert_eq!(longest_s(limits(), &circle), 0.0, "no jerk limit is kept");
+        assert_eq!(longest_s(Easing::NONE, &turn(0.6, 20.0)), 0.0);
     }
 }

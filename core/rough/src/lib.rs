@@ -12,6 +12,7 @@ mod queue;
 mod rest;
 mod rough;
 mod source;
+mod staged;
 mod window;
 
 pub use depth::QueueDepth;

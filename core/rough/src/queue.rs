@@ -12,6 +12,7 @@ use tandem_sdk::{
 use crate::Observer;
 use crate::depth::{QueueDepth, SERVED_FOR_PERIODS};
 use crate::junction_steps::JunctionSteps;
+use crate::staged::Staged;
 
 /// Collects what the planner emits, ties events to their place, and moves it into the ring as there is room.
 pub struct Queue {
@@ -20,9 +21,7 @@ pub struct Queue {
     epoch: u32,
     /// Path coordinate at the start of the epoch, mm: planners begin each at zero.
     path_start_mm: f64,
-    /// Emitted; those before `sent` are in the ring.
-    staged: Vec<Queued>,
-    sent: usize,
+    staged: Staged,
     /// Events whose block has not been emitted yet.
     events: VecDeque<Event>,
     /// Blocks accepted by the planner, not yet reported, and their curves. A block is large: by itself it is copied to its place, and
@@ -52,8 +51,7 @@ impl Queue {
             depth,
             epoch: 0,
             path_start_mm: 0.0,
-            staged: Vec::new(),
-            sent: 0,
+            staged: Staged::default(),
             events: VecDeque::new(),
             blocks: VecDeque::new(),
             curves: VecDeque::new(),
@@ -91,7 +89,6 @@ impl Queue {
             (rest.program_time_s, rest.program_time_s, true);
         self.plan_rests = true;
         self.staged.clear();
-        self.sent = 0;
         self.events.clear();
         self.blocks.clear();
         self.curves.clear();
@@ -189,10 +186,7 @@ impl Queue {
 
     /// Moves what is staged into the ring, as far as there is room.
     pub fn move_staged(&mut self) {
-        let (moved, _) = self
-            .end
-            .segments
-            .push_partial_slice(&self.staged[self.sent..]);
+        let (moved, _) = self.end.segments.push_partial_slice(self.staged.waiting());
         let last = moved
             .iter()
             .rfind(|queued| matches!(queued, Queued::Segment { .. }));
@@ -200,15 +194,8 @@ impl Queue {
             self.queued_s = start_s + segment.duration_s;
             self.ends_at_rest = segment.flags.contains(SegmentFlags::ENDS_AT_REST);
         }
-        self.sent += moved.len();
-        if self.sent == self.staged.len() {
-            self.staged.clear();
-            self.sent = 0;
-        } else if self.sent > self.staged.len() / 2 {
-            // What is left moves to the front no more often than it doubles: it may be long.
-            self.staged.drain(..self.sent);
-            self.sent = 0;
-        }
+        let count = moved.len();
+        self.staged.moved(count);
     }
 
     /// `full`: deeper the queue does not get.
@@ -247,7 +234,7 @@ impl Queue {
 
     fn stage_event(&mut self, mut event: Event) {
         (event.program_time_s, event.epoch) = (self.emitted_s, self.epoch);
-        self.staged.push(Queued::Event(event));
+        self.staged.event(event);
     }
 }
 
@@ -271,22 +258,15 @@ impl SegmentSink for Queue {
             self.stage_event(event);
         }
         let stop_on = self.stop_on(segment.block);
-        // A segment is large: it is copied to its place, and marked there. To push it would copy it twice.
-        let start_s = self.emitted_s;
-        self.staged.extend(std::iter::once_with(|| Queued::Segment {
-            start_s,
-            segment: *segment,
-        }));
-        if let Some(Queued::Segment {
-            segment: marked, ..
-        }) = self.staged.last_mut()
-        {
-            (marked.epoch, marked.stop_on) = (self.epoch, stop_on);
-            marked.path[0] += self.path_start_mm;
-            if self.junction_steps.is_step_at(segment) {
+        let is_step = self.junction_steps.is_step_at(segment);
+        let (epoch, path_start_mm) = (self.epoch, self.path_start_mm);
+        self.staged.segment(self.emitted_s, segment, |marked| {
+            (marked.epoch, marked.stop_on) = (epoch, stop_on);
+            marked.path[0] += path_start_mm;
+            if is_step {
                 marked.flags = marked.flags.with(SegmentFlags::STEPS);
             }
-        }
+        });
         self.emitted_s += segment.duration_s;
         self.plan_rests = segment.flags.contains(SegmentFlags::ENDS_AT_REST);
         self.depth.push(segment, self.emitted_s);
@@ -320,7 +300,8 @@ fn is_sound(segment: &Segment) -> bool {
             *sum += 0.0 * c;
         }
     }
-    sums == [0.0; 6] && segment.duration_s.is_finite() && segment.duration_s >= 0.0
+    let sum: f64 = sums.iter().sum();
+    sum == 0.0 && segment.duration_s.is_finite() && segment.duration_s >= 0.0
 }
 
 #[cfg(test)]

@@ -215,8 +215,7 @@ impl SimulatedDrives {
             self.quick_stopping = false;
         }
         self.mechanics.set_velocity(&self.heard.velocity);
-        let to = self.heard.position;
-        self.advance(&to);
+        self.advance(self.heard.position);
     }
 
     /// One period without a new setpoint: on at the last velocity, until the watchdog ends that.
@@ -230,19 +229,18 @@ impl SimulatedDrives {
                 .for_each(|power| power.fail(WATCHDOG_FAULT));
         }
         let to = self.mechanics.coast();
-        self.advance(&to);
+        self.advance(to);
     }
 
     /// Moves all joints over one period.
-    fn advance(&mut self, to: &AxisVector) {
+    fn advance(&mut self, mut to: AxisVector) {
         let follow = self.heard.enable != 0 && !self.quick_stopping;
         let powers = &mut self.powers[..self.joint_count];
         for power in powers.iter_mut() {
             power.command(follow);
         }
-        let to = self
-            .stops
-            .press(to, &self.shift, self.heard.limited, powers);
+        self.stops
+            .press(&mut to, &self.shift, self.heard.limited, powers);
         self.mechanics.step(powers, &to, self.spindle.speed);
         for (joint, power) in powers.iter_mut().enumerate() {
             power.settle(self.mechanics.is_at_rest(joint));

@@ -22,6 +22,8 @@ pub enum Encoder {
 pub(crate) struct Encoders {
     count_mm: f64,
     noise_mm: f64,
+    /// There is neither noise nor a count.
+    is_exact: bool,
     noise: Random,
 }
 
@@ -32,12 +34,21 @@ impl Encoders {
         Self {
             count_mm: options.encoder_count_mm,
             noise_mm: options.encoder_noise_mm,
+            is_exact: options.encoder_count_mm == 0.0 && options.encoder_noise_mm == 0.0,
             noise,
         }
     }
 
     /// What is read where a joint is at `position`: with noise, then in whole counts. Fine loop.
+    #[inline]
     pub fn read(&mut self, position: f64) -> f64 {
+        if self.is_exact {
+            return position;
+        }
+        self.read_roughly(position)
+    }
+
+    fn read_roughly(&mut self, position: f64) -> f64 {
         let noisy = if self.noise_mm == 0.0 {
             position
         } else {

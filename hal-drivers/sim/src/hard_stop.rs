@@ -68,21 +68,24 @@ impl HardStops {
         self.homing_percent = context.joints.map(|joint| joint.homing_torque_percent);
     }
 
-    /// Where the joints come that are told to be at `to`, both as their drives read it: `shift` is what they stand beside that. A
-    /// drive that pushes with more than it may goes into its fault; those in `limited` are homed. Fine loop.
+    /// Leaves in `to` where the joints come that are told to be there, both as their drives read it: `shift` is what they stand beside
+    /// that. A drive that pushes with more than it may goes into its fault; those in `limited` are homed. Fine loop.
     pub fn press(
         &self,
-        to: &AxisVector,
+        to: &mut AxisVector,
         shift: &AxisVector,
         limited: u32,
         powers: &mut [Power],
-    ) -> AxisVector {
-        let mut reached = *to;
+    ) {
+        if self.stops.is_empty() {
+            return;
+        }
+        let told = *to;
         for stop in &self.stops {
             let Some(power) = powers.get_mut(stop.joint) else {
                 continue;
             };
-            let real = to[stop.joint] + shift[stop.joint];
+            let real = told[stop.joint] + shift[stop.joint];
             let end = stop
                 .above_mm
                 .map(|at| real.min(at))
@@ -90,7 +93,7 @@ impl HardStops {
             let Some(end) = end.filter(|end| *end != real) else {
                 continue;
             };
-            reached[stop.joint] = end - shift[stop.joint];
+            to[stop.joint] = end - shift[stop.joint];
             let homing = if limited >> stop.joint & 1 == 1 {
                 self.homing_percent[stop.joint]
             } else {
@@ -100,7 +103,6 @@ impl HardStops {
                 power.fail(TORQUE_FAULT);
             }
         }
-        reached
     }
 }
 
@@ -129,8 +131,8 @@ mod tests {
             (-16.1, 0b00, -13.0, true),
         ] {
             let mut powers = [Power::new(0, 0); 2];
-            let to = AxisVector::from_slice(&[-50.0, to_mm]);
-            let reached = stops.press(&to, &shift, limited, &mut powers);
+            let mut reached = AxisVector::from_slice(&[-50.0, to_mm]);
+            stops.press(&mut reached, &shift, limited, &mut powers);
             assert_eq!((reached[0], reached[1]), (-50.0, reached_mm));
             assert_eq!(
                 powers[1].state() == JointState::Fault,

@@ -95,10 +95,10 @@ impl Mechanics {
         self.velocity = *velocity;
     }
 
-    /// One period towards `to` for the joints whose drives follow. Fine loop.
+    /// One period towards `to` for the joints whose drives follow; `powers` are those of all joints. Fine loop.
     pub fn step(&mut self, powers: &[Power], to: &AxisVector, spindle_rad_per_s: f64) {
         self.drive_motors(powers, to, spindle_rad_per_s);
-        for (index, power) in powers.iter().enumerate().take(self.count) {
+        for (index, power) in powers.iter().enumerate() {
             if power.follows() {
                 self.follow(index, to[index]);
             } else {

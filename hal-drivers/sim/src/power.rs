@@ -45,8 +45,16 @@ impl Power {
     }
 
     /// Before a period: whether the drive is to follow. Fine loop.
+    #[inline]
     pub fn command(&mut self, follow: bool) {
         let follow = follow && self.fault.is_none() && !self.is_lost;
+        // What is true nearly always is looked at first.
+        if !(follow && self.stage == Stage::On) {
+            self.change_stage(follow);
+        }
+    }
+
+    fn change_stage(&mut self, follow: bool) {
         self.stage = match (self.stage, follow) {
             (Stage::Off, true) => self.enter(Stage::Waking, self.wake_periods),
             (Stage::Waking, false) => Stage::Off,
