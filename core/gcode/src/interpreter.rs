@@ -18,7 +18,7 @@ use crate::state::parameters::{Parameters, Value};
 use crate::stated::{self, Unknown};
 use crate::syntax::expression::Context;
 use crate::syntax::line_words::{LineWords, Target};
-use crate::syntax::parse::{O_WORDS, parse};
+use crate::syntax::parse::{O_WORDS, parse, plain_words};
 use crate::syntax::scan::{ABORT, Scanner};
 use crate::words::compensation::{self, Compensation};
 use crate::words::coolant::Coolant;
@@ -434,6 +434,37 @@ impl Interpreter {
         self.words.clear();
         self.state.path.begin_line();
         self.reads_assumed.set(false);
+        let behind = plain_words(text, from, &mut self.words);
+        if behind == text.len() && self.only_goes_straight() {
+            return self.go_straight(out);
+        }
+        self.run_any(text, behind, out)
+    }
+
+    /// Whether the line, of which all has been read, says no more than where the next straight line goes: nearly all do.
+    #[inline]
+    fn only_goes_straight(&mut self) -> bool {
+        let state = &self.state;
+        !state.curves.is_open()
+            && !state.compensation.is_on()
+            && self
+                .orders
+                .sort_straight(&self.words, state.motion, &self.letters)
+    }
+
+    /// Executes such a line. What [`Self::run_any`] does beyond this is nothing for it.
+    #[inline]
+    fn go_straight(&mut self, out: &mut Vec<Item>) -> Checked<()> {
+        self.begun = true;
+        let done = self.execution(out).execute_motion();
+        if done.is_err() {
+            self.execution(out).recover(true);
+        }
+        done
+    }
+
+    /// Reads on behind byte `from`, and executes the line.
+    fn run_any(&mut self, text: &[u8], from: usize, out: &mut Vec<Item>) -> Checked<()> {
         let context = Context {
             parameters: &self.parameters,
             state: &self.state,

@@ -67,6 +67,13 @@ impl Line<'_> {
             spindle::speed(self)?;
         }
         self.act(BEFORE_MOTION)?;
+        self.execute_motion()?;
+        self.act(Group::Stop.bit())
+    }
+
+    /// Obeys the word whose path the line makes.
+    #[inline]
+    pub fn execute_motion(&mut self) -> Checked<()> {
         self.set_motion();
         match self.orders.motion {
             Some(MotionMode::Word(word)) => {
@@ -77,7 +84,7 @@ impl Line<'_> {
             Some(MotionMode::Refused) => self.advance(),
             Some(MotionMode::None) | None => {}
         }
-        self.act(Group::Stop.bit())
+        Ok(())
     }
 
     /// Lets the words of `groups` act, one group after the other.

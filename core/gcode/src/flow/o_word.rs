@@ -85,10 +85,19 @@ pub(crate) struct OWord {
 /// off, may stand before it.
 #[inline]
 pub(crate) fn find(text: &[u8], block_delete: bool) -> Option<usize> {
+    // Nearly every line begins with a word of another letter.
+    let may_be = matches!(
+        text.first(),
+        Some(b' ' | b'\t' | b'/' | b'n' | b'N' | b'o' | b'O')
+    );
+    may_be.then(|| find_any(text, block_delete))?
+}
+
+fn find_any(text: &[u8], block_delete: bool) -> Option<usize> {
     let first = text.iter().position(|b| !matches!(b, b' ' | b'\t'))?;
     match text[first] {
         b'o' | b'O' => Some(first + 1),
-        b'/' if !block_delete => find(&text[first + 1..], true).map(|at| at + first + 1),
+        b'/' if !block_delete => find_any(&text[first + 1..], true).map(|at| at + first + 1),
         b'n' | b'N' => {
             let number = |b: &u8| b.is_ascii_digit() || matches!(b, b'.' | b' ' | b'\t');
             let after = first + 1 + text[first + 1..].iter().position(|b| !number(b))?;

@@ -138,6 +138,29 @@ impl Lines {
     /// The file cannot be read, has changed, or is binary: nothing more can be read.
     #[inline]
     pub fn next(&mut self, program: &mut Program) -> Result<Next, ProgramError> {
+        self.next_here()
+            .map_or_else(|| self.next_anywhere(program), |line| Ok(Next::Line(line)))
+    }
+
+    /// The next line, where all of it lies in the chunk that is read, as nearly every line does.
+    #[inline]
+    fn next_here(&mut self) -> Option<std::ops::Range<usize>> {
+        let chunk = self.held.last()?;
+        let rest = chunk.text.get(self.at..chunk.end)?;
+        let length = memchr::memchr(b'\n', rest)?;
+        if self.skipping || length > MAX_LINE_BYTES {
+            return None;
+        }
+        let from = self.at;
+        let end = from + length - usize::from(rest[..length].ends_with(b"\r"));
+        self.at += length + 1;
+        self.number += 1;
+        Some(from..end)
+    }
+
+    /// The next line, wherever it lies and whatever it is.
+    #[inline(never)]
+    fn next_anywhere(&mut self, program: &mut Program) -> Result<Next, ProgramError> {
         loop {
             let Some(chunk) = self.held.last().filter(|chunk| self.at < chunk.end) else {
                 if self.next_chunk(program)? {

@@ -120,12 +120,11 @@ fn count_digits(eight: u64) -> usize {
 /// The number that the first `count` of eight bytes are, which are digits; there is at least one.
 #[inline]
 fn value_of(eight: u64, count: usize) -> u64 {
-    // Set to the right with zeros before them, in pairs, then fours, then all eight.
-    let values = (eight ^ 0x3030_3030_3030_3030) << (64 - 8 * count);
-    let pairs = values.wrapping_mul(10) + (values >> 8);
-    let low = (pairs & 0x0000_00ff_0000_00ff).wrapping_mul(0x000f_4240_0000_0064);
-    let high = ((pairs >> 16) & 0x0000_00ff_0000_00ff).wrapping_mul(0x0000_2710_0000_0001);
-    low.wrapping_add(high) >> 32
+    // Set to the right with zeros before them, and added up: in pairs, then fours, then all eight.
+    let digits = (eight ^ 0x3030_3030_3030_3030) << (64 - 8 * count);
+    let pairs = digits.wrapping_mul(10 << 8 | 1) >> 8 & 0x00ff_00ff_00ff_00ff;
+    let fours = pairs.wrapping_mul(100 << 16 | 1) >> 16 & 0x0000_ffff_0000_ffff;
+    fours.wrapping_mul(10_000 << 32 | 1) >> 32
 }
 
 /// Reads any number, digit by digit.

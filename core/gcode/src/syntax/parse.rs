@@ -20,7 +20,7 @@ pub(crate) fn parse(
     context: &Context,
     words: &mut LineWords,
 ) -> Checked<()> {
-    let mut scanner = Scanner::new(text, plain_words(text, from, words));
+    let mut scanner = Scanner::new(text, from);
     while !scanner.at_end() {
         read_one(&mut scanner, context, words)?;
         let behind = plain_words(text, scanner.at(), words);
@@ -33,7 +33,7 @@ pub(crate) fn parse(
 /// one that is not begins, or what is wrong: [`read_one`] reads that, and would have read these alike. No short number is too
 /// large a value.
 #[inline]
-fn plain_words(text: &[u8], mut at: usize, words: &mut LineWords) -> usize {
+pub(crate) fn plain_words(text: &[u8], mut at: usize, words: &mut LineWords) -> usize {
     while let Some(byte) = text.get(at) {
         let letter = byte.to_ascii_uppercase();
         if *byte == b' ' {
@@ -348,7 +348,8 @@ pub(crate) mod tests {
             let interpreter = Interpreter::new(mill());
             let context = interpreter.context();
             let (mut words, mut one_by_one) = (LineWords::default(), LineWords::default());
-            let read = parse(line.as_bytes(), 0, &context, &mut words);
+            let behind = plain_words(line.as_bytes(), 0, &mut words);
+            let read = parse(line.as_bytes(), behind, &context, &mut words);
             let mut scanner = Scanner::new(line.as_bytes(), 0);
             let mut expected = Ok(());
             while !scanner.at_end() && expected.is_ok() {

@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 
 use common::{blocks, mill, only_blocks, run_on};
 use proptest::prelude::*;
-use tandem_gcode::{Interpreter, Item, ProbeResult, Program, Stream, check};
+use tandem_gcode::{Diagnostic, Interpreter, Item, ProbeResult, Program, Stream, check};
 use tandem_sdk::{Block, BlockKind};
 
 /// An expression as a tree, with an evaluator that shares nothing with the interpreter.
@@ -166,6 +166,11 @@ fn line() -> impl Strategy<Value = Vec<u8>> {
     prop::collection::vec(piece, 0..6).prop_map(|pieces| pieces.join(&b' '))
 }
 
+/// Straight lines, some of them wrong.
+fn straight_line() -> impl Strategy<Value = Vec<u8>> {
+    r"(G[01] ?)?([XYZA]-?[0-9]{1,2}(\.[0-9]{0,5})? ?){1,4}".prop_map(String::into_bytes)
+}
+
 /// O-words with few labels, so that they often belong together.
 fn o_line() -> impl Strategy<Value = Vec<u8>> {
     let keywords = "sub endsub return call if elseif else endif while endwhile do repeat endrepeat break continue";
@@ -245,6 +250,31 @@ proptest! {
         }
         errors += u32::from(interpreter.finish(&mut items).is_err());
         assert_sound(&only_blocks(&items), errors > 0);
+    }
+
+    /// A line that holds nothing but where it goes straight is executed in a shorter way than one with a comment.
+    #[test]
+    fn a_comment_behind_a_line_changes_nothing(
+        lines in prop::collection::vec(prop_oneof![2 => straight_line(), 1 => line()], 0..40),
+        straight in prop::collection::vec(straight_line(), 1..20),
+    ) {
+        let (mut plain, mut commented) = (Interpreter::new(mill()), Interpreter::new(mill()));
+        let (mut items, mut expected) = (Vec::new(), Vec::new());
+        let setting = [b"F100 G1".to_vec()];
+        for (number, line) in (1..).zip(setting.iter().chain(&lines).chain(&straight)) {
+            let with_comment = [line, &b";"[..]].concat();
+            let goes_straight = line.iter().all(|b| b"GXYZA0123456789 .-".contains(b));
+            let other = if goes_straight { &with_comment } else { line };
+            let said = |result: Result<(), Diagnostic>| {
+                result.map_err(|error| (error.code, error.column, error.end_column, error.message))
+            };
+            prop_assert_eq!(
+                said(plain.line(number, line, &mut items)),
+                said(commented.line(number, other, &mut expected))
+            );
+            prop_assert_eq!(plain.position(), commented.position());
+        }
+        prop_assert_eq!(format!("{items:?}"), format!("{expected:?}"));
     }
 
     #[test]

@@ -139,6 +139,12 @@ pub(crate) struct Curves {
 }
 
 impl Curves {
+    /// Whether lines of a curve may follow.
+    #[inline]
+    pub fn is_open(&self) -> bool {
+        self.open.is_some()
+    }
+
     /// Keeps the line `number` of a curve, which has just been read.
     #[inline]
     pub fn note(&mut self, number: u32, text: &[u8]) {
