@@ -461,7 +461,8 @@ impl<const L: usize> Planning<L> {
             }
         };
         let moving = std::array::from_fn(|l| l < frame.count && !rests[l]);
-        self.retimer.begin(self.spline.step_s, &moving);
+        self.retimer
+            .begin(self.spline.intervals(), self.spline.step_s, &moving);
         let mut ends = self.spline.at(0, 0.0);
         for k in 0..self.spline.intervals() {
             let feed = feeds.of(k);
@@ -508,6 +509,7 @@ impl<const L: usize> Planning<L> {
     fn build(&mut self, rests: &[bool; L], at: &Lanes<L>, window: &mut Window<L>) {
         let h = self.spline.step_s;
         window.pieces.clear();
+        window.pieces.reserve(self.spline.intervals());
         window.marks.clone_from(&self.marks);
         let state = |k: usize, z: f64| -> State<L> {
             let [x, x1, x2, _] = self.spline.at(k, z);

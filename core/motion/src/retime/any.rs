@@ -117,7 +117,8 @@ fn solve<const L: usize>(
         per_jerk: each(|l| per(&limits.jerk_mm_per_s3, l)),
     };
     let moving = std::array::from_fn(|l| l < limits.count && task.moves(l));
-    retimer.begin(task.step_s, &moving);
+    let count = task.points.len() + task.between.len();
+    retimer.begin(count, task.step_s, &moving);
     for points in task.points {
         retimer.push(&points.each_ref().map(narrow), &factors);
     }

@@ -213,8 +213,12 @@ impl<const L: usize, const GROUPS: usize> Retimer<L, GROUPS> {
     const BOUNDS: usize = Self::ACCELERATIONS + 1;
 
     /// Begins a grid with intervals of `step_s` for a motion of the axes that are `moving`. Then [`Retimer::push`] every interval,
-    /// and [`Retimer::solve`].
-    pub fn begin(&mut self, step_s: f64, moving: &[bool; L]) {
+    /// `count` times with what is pushed between, and [`Retimer::solve`].
+    pub fn begin(&mut self, count: usize, step_s: f64, moving: &[bool; L]) {
+        // Sites are large: where room is made for some more at a time, those there are would be copied again and again.
+        let missing = count.div_ceil(WIDE).saturating_sub(self.sites.len());
+        self.sites.reserve(missing);
+        self.rows.reserve(missing);
         self.count = 0;
         self.intervals = 0;
         self.step_s = step_s;

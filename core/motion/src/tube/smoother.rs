@@ -147,6 +147,7 @@ impl<const L: usize> Smoother<L> {
     #[inline(always)]
     fn begin(&mut self, spline: &Spline<L>, waypoints: &[Waypoint<L>]) {
         self.rows.clear();
+        self.rows.reserve(waypoints.len());
         for waypoint in waypoints {
             let interval = waypoint.interval as usize;
             let w = weights(waypoint.z);
