@@ -55,10 +55,12 @@ export async function hold() {
 
 const LINES = 300000;
 const [MOST_S, MOST_TASK_MS, MOST_HEAP_MB] = [4, 200, 250];
+// Largest part of the browser's processor time that one task may have: were all lines drawn in one, it would have nearly all of it.
+const MOST_OF_A_TASK = 0.25;
 
 // A program of 300 000 lines is drawn while the page stays at hand, by the processor alone: each line is told once and drawn once, and
 // turning the view draws it all again. The processor time of everything that the browser and the controller do for it is less than
-// the time within which it has to be drawn.
+// the time within which it has to be drawn, and no task has much of it.
 export async function many() {
   const folder = mkdtempSync(join(tmpdir(), "tandem-many-"));
   const lines = ["G21 G90 F3000"];
@@ -99,7 +101,8 @@ export async function many() {
       check(heap <= MOST_HEAP_MB, `the heap has ${heap} MB`);
       check(drawn.answers <= 120, `${drawn.answers} answers for ${drawn.points} points`);
       check(drawn.painted <= 2 * drawn.points, `${drawn.painted} points painted for ${drawn.points}`);
-      check(browsers + controllers <= MOST_S && task <= MOST_TASK_MS, `${browsers} and ${controllers} s, a task of ${task} ms of the processor`);
+      const part = task / 1000 / browsers;
+      check(browsers + controllers <= MOST_S && part <= MOST_OF_A_TASK, `${browsers} and ${controllers} s, a task of ${task} ms of the processor`);
       if (process.env.TANDEM_QUIET) check(seconds <= MOST_S && drawn.longest <= MOST_TASK_MS, `${seconds} s, a task of ${drawn.longest} ms`);
       clean(page);
     }, ["--programs", folder]);

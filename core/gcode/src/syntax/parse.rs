@@ -328,7 +328,7 @@ pub(crate) mod tests {
 
     /// Lines of words as programs have them, and of what else may stand between them.
     pub fn any_line() -> impl Strategy<Value = String> {
-        let words = "G0 G1 g1 G01 G2 G53 G61.1 G80 G92 G1000 M3 M199 X#1 X[1+2] Y5 z-.5 F100 N7 T2 TA5 TABS[1] O5 @1 ^2 $0 #1=2             #<a>=3 (c) (abort,c) ; / % E5 X- Y. \u{e9}";
+        let words = "G0 G1 g1 G01 G2 G53 G61.1 G80 G92 G1000 M3 M199 X#1 X[1+2] Y5 z-.5 F100 N7 T2 TA5 TABS[1] O5 @1 ^2 $0 #1=2 #<a>=3 (c) (abort,c) ; / % E5 X- Y. \u{e9}";
         let words = prop::sample::select(words.split(' ').collect::<Vec<_>>());
         let number = r"[A-Za-z][ \t]?[+-]?[0-9]{0,9}(\.[0-9]{0,9})?";
         let axis = r"[XYZ][+-]?[0-9]{1,3}(\.[0-9]{0,5})?";
