@@ -74,8 +74,11 @@ impl LastMotion {
     /// It stands once more.
     #[inline]
     fn rest(&mut self, axis: usize) {
-        (self.velocity[axis], self.acceleration[axis]) = (0.0, 0.0);
-        (self.buckets[0][axis], self.buckets[1][axis]) = (0.0, 0.0);
+        self.velocity[axis] = 0.0;
+        self.acceleration[axis] = 0.0;
+        for bucket in &mut self.buckets {
+            bucket[axis] = 0.0;
+        }
     }
 }
 
@@ -211,7 +214,8 @@ impl Judge<'_> {
         let bounds = &self.bounds[axis];
         let period_s = self.config.period_s;
         let at = self.position[axis];
-        let (last, now) = (self.last, &mut *self.now);
+        let last = self.last;
+        let now = &mut *self.now;
         // What stands where it stood breaks nothing, and leaves nothing behind.
         if next == at && last.rests(axis) {
             now.rest(axis);

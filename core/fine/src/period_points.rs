@@ -251,6 +251,7 @@ mod tests {
     use crate::cursor::Cursor;
     use crate::governor::Governor;
     use rtrb::RingBuffer;
+    use tandem_rig::Random;
     use tandem_rings::Queued;
     use tandem_sdk::{AxisVector, SegmentFlags};
 
@@ -370,12 +371,6 @@ mod tests {
         }
     }
 
-    /// The next of a row of numbers from -1 to 1.
-    fn next_of(seed: &mut u64) -> f64 {
-        *seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-        (*seed >> 40) as f64 / f64::from(1 << 23) - 1.0
-    }
-
     /// Segments about their limits, some within and some beyond: whether points are kept or not, the highest rate at which the plan
     /// keeps its limits is the same, and most segments that keep them are known to.
     #[test]
@@ -386,17 +381,19 @@ mod tests {
             acceleration_mm_per_s2: 200.0,
             ..AxisLimits::unlimited()
         }; MAX_AXES];
-        let (mut seed, mut within, mut known) = (1, 0, 0);
+        let mut random = Random::new(1);
+        let mut within = 0;
+        let mut known = 0;
         for _ in 0..200 {
             let mut exact = PeriodPoints::new(&limits, 2);
             let mut quick = PeriodPoints::new(&limits, 2).without_points();
             let mut segment = Segment::rest(&AxisVector::ZERO, 0.01);
             segment.flags = [SegmentFlags::default(), SegmentFlags::RAPID]
-                [usize::from(next_of(&mut seed) > 0.0)];
+                [usize::from(random.between(-1.0, 1.0) > 0.0)];
             for c in &mut segment.coefficients {
-                *c = [0.0, 12.0, 110.0, 1e3, 2e4, 5e5].map(|most| most * next_of(&mut seed));
+                *c = [0.0, 12.0, 110.0, 1e3, 2e4, 5e5].map(|most| random.between(-most, most));
             }
-            segment.step_acceleration[1] = 20.0 * next_of(&mut seed);
+            segment.step_acceleration[1] = random.between(-20.0, 20.0);
             let ahead = Ahead::new(&segment, Some(0.0), 1, None);
             exact.fill(&ahead, 0.01);
             quick.fill(&ahead, 0.01);

@@ -259,9 +259,11 @@ impl SegmentSink for Queue {
         }
         let stop_on = self.stop_on(segment.block);
         let is_step = self.junction_steps.is_step_at(segment);
-        let (epoch, path_start_mm) = (self.epoch, self.path_start_mm);
+        let epoch = self.epoch;
+        let path_start_mm = self.path_start_mm;
         self.staged.segment(self.emitted_s, segment, |marked| {
-            (marked.epoch, marked.stop_on) = (epoch, stop_on);
+            marked.epoch = epoch;
+            marked.stop_on = stop_on;
             marked.path[0] += path_start_mm;
             if is_step {
                 marked.flags = marked.flags.with(SegmentFlags::STEPS);

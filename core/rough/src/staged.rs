@@ -30,7 +30,8 @@ impl Staged {
 
     /// Forgets all entries.
     pub fn clear(&mut self) {
-        (self.sent, self.filled) = (0, 0);
+        self.sent = 0;
+        self.filled = 0;
     }
 
     /// Adds an event.
@@ -83,7 +84,8 @@ impl Staged {
         } else if self.sent > self.filled / 2 {
             // What is left moves to the front no more often than it doubles: it may be long.
             self.slots.copy_within(self.sent..self.filled, 0);
-            (self.sent, self.filled) = (0, self.filled - self.sent);
+            self.filled -= self.sent;
+            self.sent = 0;
         }
     }
 }

@@ -1,46 +1,37 @@
 //! Largest value over a sliding window of program time.
 
+use std::collections::VecDeque;
+
 /// Keeps the largest of the values whose end lies ahead. Amortised constant work a value.
 #[derive(Debug, Default)]
 pub struct SlidingMax {
-    /// Values that fall from `first` on, with the program time at which each ends. What lies before it is over.
-    values: Vec<(f64, f64)>,
-    first: usize,
+    /// Values that fall from front to back, with the program time at which each ends.
+    values: VecDeque<(f64, f64)>,
 }
 
 impl SlidingMax {
     /// Adds a value that holds until `until_s`.
     pub fn push(&mut self, value: f64, until_s: f64) {
-        while self.ahead().last().is_some_and(|(last, _)| *last <= value) {
-            self.values.pop();
+        while self.values.back().is_some_and(|(last, _)| *last <= value) {
+            self.values.pop_back();
         }
-        self.values.push((value, until_s));
+        self.values.push_back((value, until_s));
     }
 
     /// Forgets what ended before `now_s`.
     pub fn forget(&mut self, now_s: f64) {
         while self
-            .ahead()
-            .first()
+            .values
+            .front()
             .is_some_and(|(_, until_s)| *until_s < now_s)
         {
-            self.first += 1;
-        }
-        if self.first > self.values.len() / 2 {
-            // What is left moves to the front no more often than it doubles.
-            self.values.drain(..self.first);
-            self.first = 0;
+            self.values.pop_front();
         }
     }
 
     /// The largest value, if there is one.
     pub fn max(&self) -> Option<f64> {
-        self.ahead().first().map(|(value, _)| *value)
-    }
-
-    #[inline]
-    fn ahead(&self) -> &[(f64, f64)] {
-        &self.values[self.first..]
+        self.values.front().map(|(value, _)| *value)
     }
 }
 

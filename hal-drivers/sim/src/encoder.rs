@@ -22,8 +22,6 @@ pub enum Encoder {
 pub(crate) struct Encoders {
     count_mm: f64,
     noise_mm: f64,
-    /// There is neither noise nor a count.
-    is_exact: bool,
     noise: Random,
 }
 
@@ -34,7 +32,6 @@ impl Encoders {
         Self {
             count_mm: options.encoder_count_mm,
             noise_mm: options.encoder_noise_mm,
-            is_exact: options.encoder_count_mm == 0.0 && options.encoder_noise_mm == 0.0,
             noise,
         }
     }
@@ -42,7 +39,7 @@ impl Encoders {
     /// What is read where a joint is at `position`: with noise, then in whole counts. Fine loop.
     #[inline]
     pub fn read(&mut self, position: f64) -> f64 {
-        if self.is_exact {
+        if self.noise_mm == 0.0 && self.count_mm == 0.0 {
             return position;
         }
         self.read_roughly(position)

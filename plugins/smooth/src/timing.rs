@@ -3,6 +3,7 @@
 use tandem_motion::tube::{Lanes, each};
 
 use crate::frame::{Frame, along, largest};
+use crate::peaks::AT_FEED;
 use crate::route::{Chord, Run, chord_at};
 
 /// A turn by more than this, as the size of the change of direction, is sharp: nodes gather around it.
@@ -27,9 +28,6 @@ const SCALLOP: f64 = 4.2;
 const RAMP: f64 = 0.35;
 /// Factor from one speed tried to the next.
 const SLOWER: f64 = 0.9;
-
-/// Share of the speed that a place allows from which on it is as good as reached.
-const AT_FEED: f64 = 0.99;
 
 /// A place on the path.
 #[derive(Clone, Copy, Debug)]

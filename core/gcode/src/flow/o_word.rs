@@ -90,7 +90,11 @@ pub(crate) fn find(text: &[u8], block_delete: bool) -> Option<usize> {
         text.first(),
         Some(b' ' | b'\t' | b'/' | b'n' | b'N' | b'o' | b'O')
     );
-    may_be.then(|| find_any(text, block_delete))?
+    if may_be {
+        find_any(text, block_delete)
+    } else {
+        None
+    }
 }
 
 fn find_any(text: &[u8], block_delete: bool) -> Option<usize> {

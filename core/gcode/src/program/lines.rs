@@ -1,5 +1,6 @@
 //! A file as lines, read in chunks of whole lines.
 
+use std::hash::{DefaultHasher, Hasher};
 use std::sync::Arc;
 
 use super::{KnownChunk, Program, ProgramError};
@@ -8,8 +9,6 @@ use crate::interpreter::MAX_LINE_BYTES;
 use crate::line_error::{LineError, Span};
 
 const CHUNK: usize = 64 * 1024;
-/// 2⁶⁴ times the golden section, which is odd: bits that are close to each other come apart.
-const HASH_FACTOR: u64 = 0x9e37_79b9_7f4a_7c15;
 const BOM: &[u8] = b"\xef\xbb\xbf";
 
 /// What the reader does with the hash of each chunk.
@@ -259,7 +258,9 @@ impl Lines {
         chunk: &Chunk,
         offset: u64,
     ) -> Result<bool, ProgramError> {
-        let hash = hash(&chunk.text[..chunk.end]);
+        let mut hasher = DefaultHasher::new();
+        hasher.write(&chunk.text[..chunk.end]);
+        let hash = hasher.finish();
         let known = program.chunks.get_or_insert_default();
         match known.get(chunk.index) {
             Some(before) if before.hash == hash => Ok(false),
@@ -319,18 +320,6 @@ impl Lines {
         let text = &chunk[start..start + length.min(MAX_LINE_BYTES).max(at - start)];
         Err(Diagnostic::new(&program.name, line, text, error).into())
     }
-}
-
-/// A number that is another one for a text that has changed: for certain where the change lies within eight bytes that are added
-/// together, as each step gives another number for other bytes and for another number before.
-fn hash(text: &[u8]) -> u64 {
-    let add = |hash: u64, bytes: u64| (hash.rotate_left(5) ^ bytes).wrapping_mul(HASH_FACTOR);
-    let (eights, rest) = text.as_chunks();
-    let hash = eights.iter().fold(text.len() as u64, |hash, eight| {
-        add(hash, u64::from_le_bytes(*eight))
-    });
-    rest.iter()
-        .fold(hash, |hash, byte| add(hash, u64::from(*byte)))
 }
 
 /// The text from `at` to the next line end, where the line after it begins, and whether there is a line end (or the file

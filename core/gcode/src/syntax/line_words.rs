@@ -35,9 +35,12 @@ impl Codes {
     /// Adds a word; false where there is no place for it.
     #[inline]
     pub fn take(&mut self, code: Code) -> bool {
-        let place = self.codes.get_mut(self.count);
-        self.count += usize::from(place.is_some());
-        place.map(|place| *place = code).is_some()
+        let Some(place) = self.codes.get_mut(self.count) else {
+            return false;
+        };
+        *place = code;
+        self.count += 1;
+        true
     }
 
     pub fn as_slice(&self) -> &[Code] {
